@@ -37,10 +37,11 @@ DecodeOptions::declare (Options &options)
   options.flag ("--refine", refine,
       "after --fuse: corrects its frames by a network that learned from "
       "pictures");
-  options.flag ("--overlap", overlap,
-      "after --fuse: exposures between coded frames are fused as well, so that "
-      "the first and last slots of a frame are as true as the others; takes "
-      "twice the time");
+  options.value ("--overlap", overlap, "N",
+      "after --fuse: exposures that are fused for each coded frame; beyond 1, "
+      "those between two frames make the first and last slots as true as the "
+      "others, in N times the time [1]",
+      whole (1, 4));
   options.value ("--bench", bench, "FILE",
       "bench profile (JSON) with noise, black level, leakage and mapping; "
       "other options win [that of the recording]");
@@ -81,12 +82,12 @@ DecodeOptions::words () const
     add ("read-noise", property_text (*read_noise));
   if (range)
     add ("range", std::to_string (*range));
+  if (overlap)
+    add ("overlap", std::to_string (*overlap));
   if (bits)
     add ("bits", std::to_string (*bits));
   if (refine)
     words.emplace_back ("--refine");
-  if (overlap)
-    words.emplace_back ("--overlap");
   return words;
 }
 

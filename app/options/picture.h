@@ -12,8 +12,8 @@ namespace codedexposure::app
 struct DecodeOptions {
   std::optional<Text> method, mapping, fuse, bench, schedule;
   std::optional<double> full_well, read_noise;
-  std::optional<int> bits, range;
-  bool refine = false, overlap = false;
+  std::optional<int> bits, range, overlap;
+  bool refine = false;
 
   void declare (Options &options);
   /** Some of them. @p origin  of the frames: "the recording". */

@@ -56,11 +56,10 @@ add_fusion (Job &job, Chain &frames, const DecodeOptions &options,
   settings.emplace_back ("lookahead", 1);
   if (options.refine)
     settings.emplace_back ("refine", true);
-  if (options.overlap)
-    settings.emplace_back ("overlap", true);
   set_if (settings, "full-well", options.full_well);
   set_if (settings, "read-noise", options.read_noise);
   set_if (settings, "range", options.range);
+  set_if (settings, "overlap", options.overlap);
   set_if (settings, "threads", threads);
   frames.to ("queue", {{"max-size-buffers", 1}})
       .to ("codedexposure-fuse", settings);

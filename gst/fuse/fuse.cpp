@@ -54,9 +54,9 @@
  *
  * The first and the last slots of an exposure are less accurate than those in
  * its middle, which have others around them. With
- * #codedexposure-fuse:overlap, the second half of each coded frame and the
- * first half of the next are fused like one more coded frame, in whose middle
- * these slots are, and both estimates are mixed. It takes twice the time.
+ * #codedexposure-fuse:overlap, the last slots of each coded frame and the first
+ * ones of the next are fused like more coded frames, in whose middle these
+ * slots are, and the estimates are mixed. It takes as many times as long.
  *
  * Tell the element about the camera's noise (#codedexposure-fuse:full-well,
  * #codedexposure-fuse:read-noise), or give it a bench profile, which a

@@ -55,12 +55,13 @@ Fuse::properties ()
           kReadWrite, &FuseOptions::lookahead, 0u,
           guint (Fuser<std::uint8_t>::kMaxLookahead)},
       {"overlap", "Overlap",
-          "Also fuse the exposures from the middle of each coded frame to that "
-          "of the next, which makes the first and last slots of a frame as "
-          "true as the others, in twice the time; needs lookahead=1; for "
-          "one-hot codes and frames with hardly a gap, others stay as they "
-          "are, with a warning",
-          kReadWrite, &FuseOptions::overlap},
+          "Exposures that are fused for each coded frame: beyond 1, also those "
+          "that begin in it and end in the next one, which makes the first and "
+          "last slots of a frame as true as the others, in as many times the "
+          "time; needs lookahead=1; for one-hot codes and frames with hardly a "
+          "gap, others stay as they are, with a warning",
+          kReadWrite, &FuseOptions::overlap, 1u,
+          guint (Fuser<std::uint8_t>::kMaxOverlap)},
       {"threads", "Threads",
           "Threads, which do not change pixels; 0: one for each processor, and "
           "for quality fast without refine, the streaming thread only, but to "
@@ -115,8 +116,8 @@ Fuse::method_name () const
                      g_enum_get_value (qualities, int (quality))->value_nick;
   if (plan_ && plan_->partners)
     name += ", both beams";
-  if (in_force_.overlap && unoverlapped ().empty ())
-    name += ", overlapped";
+  if (in_force_.overlap > 1 && unoverlapped ().empty ())
+    name += ", overlap " + std::to_string (in_force_.overlap);
   if (in_force_.range > 1)
     name += ", range " + std::to_string (in_force_.range);
   if ((learned || in_force_.refine) && unrefined ().empty ())
@@ -324,8 +325,9 @@ Fuse::plan (const CodedFormat &format)
   }
   options.bits = significant_bits ();
   options.noise = noise (format.schedule);
-  std::string gap = options.overlap ? gap_of (format) : std::string ();
-  options.overlap &= gap.empty ();
+  std::string gap = options.overlap > 1 ? gap_of (format) : std::string ();
+  if (!gap.empty ())
+    options.overlap = 1;
   const std::stop_token stop = stop_token ();
   auto fuser = format.wide ()
                    ? make_fuser<std::uint16_t> (format, options, stop)

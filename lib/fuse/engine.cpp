@@ -100,7 +100,12 @@ check (const FuseOptions &options)
   if (options.lookahead < 0 || options.lookahead > 1)
     return Error{"lookahead " + std::to_string (options.lookahead) +
                  ": it must be 0 or 1 coded frames"};
-  if (options.overlap && options.lookahead == 0)
+  constexpr int kMaxOverlap = Fuser<std::uint8_t>::kMaxOverlap;
+  if (options.overlap < 1 || options.overlap > kMaxOverlap)
+    return Error{"overlap " + std::to_string (options.overlap) + ": 1 to " +
+                 std::to_string (kMaxOverlap) +
+                 " exposures are fused for each coded frame"};
+  if (options.overlap > 1 && options.lookahead == 0)
     return Error{"overlap needs the coded frame after the one that is fused; "
                  "set lookahead to 1"};
   constexpr int kMaxRange = Fuser<std::uint8_t>::kMaxRange;

@@ -129,7 +129,7 @@ make_pieces (const Schedule &schedule, int width, int height,
                          rect.width, rect.height, options, largest, stop));
     Piece &piece = pieces.emplace_back (
         Piece{rect, schedule.slots () / part.slots (), std::move (engine), {}});
-    if (!options.overlap)
+    if (options.overlap == 1)
       continue;
     const std::string why_not = fuse::Overlap::why_not (part, options);
     if (!why_not.empty ()) {

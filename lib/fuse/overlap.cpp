@@ -18,15 +18,14 @@ namespace
  * the exposure between. */
 constexpr double kMaxLeak = 0.01;
 
-/* Weights of a coded frame's own estimate, at its ends and in its middle. */
-constexpr float kAtEnds = 0.3f, kInMiddle = 0.7f;
-
+/* Of an estimate of slot @at of an exposure. */
 float
-own_weight (int slot, int slots)
+weight_of (int at, int slots)
 {
+  constexpr float kAtEnds = 0.3f;
   const float sine = std::sin (
-      std::numbers::pi_v<float> * (float (slot) + 0.5f) / float (slots));
-  return kAtEnds + (kInMiddle - kAtEnds) * sine * sine;
+      std::numbers::pi_v<float> * (float (at) + 0.5f) / float (slots));
+  return kAtEnds + (1.0f - kAtEnds) * sine * sine;
 }
 
 } // namespace
@@ -43,7 +42,7 @@ Overlap::why_not (const Schedule &schedule, const FuseOptions &options)
   if (schedule.leak () > kMaxLeak)
     return text + ": mirrors that are off pass " +
            real_text (std::round (1000.0 * schedule.leak ()) / 10.0) +
-           " % of the light of slots that the exposure between two frames has "
+           " % of the light of slots that exposures between two frames have "
            "not; it must be " +
            real_text (100.0 * kMaxLeak) + " % at most";
   return {};
@@ -54,123 +53,157 @@ Overlap::make (const Schedule &schedule, int width, int height,
     const FuseOptions &options, double steps, std::stop_token stop)
 {
   FuseOptions between = options;
-  between.overlap = false;
+  between.overlap = 1;
   between.lookahead = 0;
-  ASSIGN_OR_RETURN (auto engine,
-      Engine::make (schedule.from_slot (schedule.slots () / 2), nullptr, width,
-          height, between, steps, std::move (stop)));
-  return std::unique_ptr<Overlap> (new Overlap (schedule, std::move (engine)));
+  const int slots = schedule.slots ();
+  const int count = std::min (options.overlap, slots);
+  std::unique_ptr<Overlap> overlap (new Overlap (slots));
+  for (int i = 1; i < count; i++) {
+    const int first = i * slots / count;
+    ASSIGN_OR_RETURN (
+        auto engine, Engine::make (schedule.from_slot (first), nullptr, width,
+                         height, between, steps, stop));
+    overlap->between_.emplace_back (schedule, first, std::move (engine));
+  }
+  return overlap;
 }
 
-Overlap::Overlap (const Schedule &schedule, std::unique_ptr<Engine> engine)
-    : slots_ (schedule.slots ()), first_ (slots_ / 2),
-      late_ (engine->size ().width, engine->size ().height),
-      engine_ (std::move (engine))
+Overlap::Between::Between (
+    const Schedule &schedule, int first_slot, std::unique_ptr<Engine> its)
+    : first (first_slot), late (its->size ().width, its->size ().height),
+      engine (std::move (its))
 {
-  for (int y = 0; y < late_.height (); y++)
-    for (int x = 0; x < late_.width (); x++)
-      for (int s = first_; s < slots_; s++)
-        late_.row (y)[x] |= std::uint8_t (schedule.on (x, y, s));
+  for (int y = 0; y < late.height (); y++)
+    for (int x = 0; x < late.width (); x++)
+      for (int s = first; s < schedule.slots (); s++)
+        late.row (y)[x] |= std::uint8_t (schedule.on (x, y, s));
 }
 
-/* The exposure after the middle of a coded frame. */
+/* The exposure that begins in a coded frame. */
 void
-Overlap::take (const CodedFrames &frames)
+Overlap::Between::take (const CodedFrames &frames)
 {
   const CodedFrame &now = *frames.now, &next = *frames.after;
-  CodedFrame &between = engine_->stream ().next ();
+  CodedFrame &frame = engine->stream ().next ();
   const auto join = [&] (const Field &a, const Field &b, Field &to) {
-    for (int y = 0; y < late_.height (); y++)
-      for (int x = 0; x < late_.width (); x++)
-        to.row (y)[x] = (late_.row (y)[x] ? a : b).row (y)[x];
+    for (int y = 0; y < late.height (); y++)
+      for (int x = 0; x < late.width (); x++)
+        to.row (y)[x] = (late.row (y)[x] ? a : b).row (y)[x];
   };
-  join (now.light, next.light, between.light);
+  join (now.light, next.light, frame.light);
   if (!now.errors.empty () && !next.errors.empty ()) {
-    between.errors = Field (late_.width (), late_.height ());
-    join (now.errors, next.errors, between.errors);
+    frame.errors = Field (late.width (), late.height ());
+    join (now.errors, next.errors, frame.errors);
   }
-  engine_->stream ().take (engine_->kernels ());
+  engine->stream ().take (engine->kernels ());
 }
 
 bool
-Overlap::fuse (
+Overlap::Between::fuse (
     Fused &to, bool deviations, Workers &workers, std::stop_token stop)
 {
-  const auto keep_in = [] (std::vector<Field> &fields) {
-    return [&fields] (int slot, int y, const float *row) {
-      Field &field = fields[std::size_t (slot)];
-      std::copy_n (row, field.width (), field.row (y));
-    };
+  const auto slots = std::size_t (engine->slots ());
+  const auto [width, height] = engine->size ();
+  const auto keep = [] (std::vector<Field> &fields, std::size_t slot, int y,
+                        const float *row) {
+    std::copy_n (row, fields[slot].width (), fields[slot].row (y));
   };
-  const auto [width, height] = engine_->size ();
-  to.light.resize (std::size_t (slots_), Field (width, height));
-  const auto keep_light = keep_in (to.light);
+  to.light.resize (slots, Field (width, height));
+  to.deviations.resize (deviations ? slots : 0, Field (width, height));
   const RowSink sink = [&] (int y, const float *const *rows) {
-    for (int s = 0; s < slots_; s++)
-      keep_light (s, y, rows[s]);
+    for (std::size_t s = 0; s < slots; s++)
+      keep (to.light, s, y, rows[s]);
   };
-  Uncertainty::Sink of_deviations;
-  if (!deviations) {
-    to.deviations.clear ();
-  } else {
-    to.deviations.resize (std::size_t (slots_), Field (width, height));
-    of_deviations = [keep = keep_in (to.deviations)] (
-                        const Uncertainty::Row &row) {
-      keep (row.slot, row.y, row.deviations);
-    };
-  }
-  to.known = engine_->fuse (sink, workers, std::move (stop), of_deviations);
+  const Uncertainty::Sink of_deviations = [&] (const Uncertainty::Row &row) {
+    keep (to.deviations, std::size_t (row.slot), row.y, row.deviations);
+  };
+  to.known = engine->fuse (sink, workers, std::move (stop),
+      deviations ? of_deviations : Uncertainty::Sink ());
   return to.known;
+}
+
+bool
+Overlap::Between::run (const CodedFrames &frames, bool deviations,
+    Workers &workers, std::stop_token stop)
+{
+  std::swap (before, after);
+  after.known = false;
+  if (engine->stream ().pending () > 0 &&
+      !fuse (before, deviations, workers, stop))
+    return false;
+  if (!frames.after)
+    return true;
+  take (frames);
+  return fuse (after, deviations, workers, std::move (stop));
 }
 
 bool
 Overlap::run (const CodedFrames &frames, bool deviations, Workers &workers,
     std::stop_token stop)
 {
-  std::swap (before_, after_);
-  after_.known = false;
-  if (engine_->stream ().pending () > 0 &&
-      !fuse (before_, deviations, workers, stop))
-    return false;
-  if (!frames.after)
-    return true;
-  take (frames);
-  return fuse (after_, deviations, workers, std::move (stop));
+  return std::ranges::all_of (between_, [&] (Between &between) {
+    return between.run (frames, deviations, workers, stop);
+  });
 }
 
+/* The exposure that begins in the last frame of a history is fused with the
+ * first frame after it. */
 void
 Overlap::pass (const CodedFrames &frames, Workers &workers)
 {
-  before_.known = after_.known = false;
-  if (engine_->stream ().pending () > 0)
-    engine_->pass (workers);
-  if (frames.after)
-    take (frames);
+  for (Between &between : between_) {
+    between.before.known = between.after.known = false;
+    if (between.engine->stream ().pending () > 0)
+      between.engine->pass (workers);
+    if (frames.after)
+      between.take (frames);
+  }
 }
 
 void
 Overlap::forget ()
 {
-  before_.known = after_.known = false;
-  engine_->forget ();
+  for (Between &between : between_) {
+    between.before.known = between.after.known = false;
+    between.engine->forget ();
+  }
 }
 
+/* In the row of one of them, which nobody needs again. */
 const float *
 Overlap::mix (std::vector<Field> Fused::*which, int slot, int y,
     const float *own, const float *is_static)
 {
-  Fused &between = slot < first_ ? before_ : after_;
-  std::vector<Field> &fields = between.*which;
-  if (!between.known || fields.empty ())
+  const float weight = weight_of (slot, slots_);
+  float sum = weight;
+  float *to = nullptr;
+  int width = 0;
+  for (Between &between : between_) {
+    const bool early = slot < between.first;
+    Fused &fused = early ? between.before : between.after;
+    std::vector<Field> &fields = fused.*which;
+    if (!fused.known || fields.empty ())
+      continue;
+    const int at = slot - between.first + (early ? slots_ : 0);
+    Field &field = fields[std::size_t (at)];
+    const float its = weight_of (at, slots_);
+    const float *from = field.row (y);
+    width = field.width ();
+    sum += its;
+    if (!to) {
+      to = field.row (y);
+      for (int x = 0; x < width; x++)
+        to[x] = weight * own[x] + its * from[x];
+    } else {
+      for (int x = 0; x < width; x++)
+        to[x] += its * from[x];
+    }
+  }
+  if (!to)
     return own;
-  const int its_slot = slot < first_ ? slot + slots_ - first_ : slot - first_;
-  Field &other = fields[std::size_t (its_slot)];
-  float *row = other.row (y);
-  const float weight = own_weight (slot, slots_);
-  for (int x = 0; x < other.width (); x++)
-    row[x] =
-        own[x] + (1.0f - is_static[x]) * (1.0f - weight) * (row[x] - own[x]);
-  return row;
+  for (int x = 0; x < width; x++)
+    to[x] = own[x] + (1.0f - is_static[x]) * (to[x] / sum - own[x]);
+  return to;
 }
 
 } // namespace codedexposure::fuse

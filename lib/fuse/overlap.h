@@ -13,11 +13,10 @@ namespace codedexposure::fuse
 
 /**
  * The slots in the middle of an exposure are truest: others lie around them in
- * time on both sides. Where each pixel is of one slot, the second half of a
- * coded frame's slots and the first half of the next one's are an exposure,
- * too, in whose middle the ends of both meet. It is fused like a coded frame,
- * and of the two estimates of a slot, the one counts more that lies nearer to
- * the middle of its exposure.
+ * time on both sides. Where each pixel is of one slot, the last slots of a
+ * coded frame and the first ones of the next are an exposure, too, which is
+ * fused like a coded frame. A slot is in several such exposures, and the
+ * estimates count the more the nearer it lies to the middle of theirs.
  */
 class Overlap
 {
@@ -35,15 +34,15 @@ public:
       int width, int height, const FuseOptions &options, double steps,
       std::stop_token stop);
 
-  /** Fuses the exposures before and after the middle of a coded frame, which
-   * is to be fused next. False, or Stopped, when it was stopped. */
+  /** Fuses the exposures around a coded frame, which is to be fused next.
+   * False, or Stopped, when it was stopped. */
   bool run (const CodedFrames &frames, bool deviations, Workers &workers,
       std::stop_token stop);
   /** Instead of run (), for a coded frame that is not fused. */
   void pass (const CodedFrames &frames, Workers &workers);
   void forget ();
 
-  /** Both estimates of row @p y of a slot, once for each.
+  /** All estimates of row @p y of a slot, once for each.
    * @p own        that of the coded frame.
    * @p is_static  what is not mixed, 0 to 1. */
   const float *mix (int slot, int y, const float *own, const float *is_static)
@@ -58,24 +57,33 @@ public:
   }
 
 private:
-  Overlap (const Schedule &schedule, std::unique_ptr<Engine> engine);
-
   /** An exposure between two coded frames. */
   struct Fused {
     bool known = false;
     std::vector<Field> light, deviations; ///< of its slots
   };
-  void take (const CodedFrames &frames);
-  bool fuse (
-      Fused &to, bool deviations, Workers &workers, std::stop_token stop);
+  /** Exposures that begin in the same slot of every coded frame. */
+  struct Between {
+    int first;                  ///< this slot
+    FieldOf<std::uint8_t> late; ///< pixels whose slot is not before it
+    std::unique_ptr<Engine> engine;
+    Fused before, after; ///< of which the last coded frame has slots
+
+    Between (
+        const Schedule &schedule, int first_slot, std::unique_ptr<Engine> its);
+    void take (const CodedFrames &frames);
+    bool fuse (
+        Fused &to, bool deviations, Workers &workers, std::stop_token stop);
+    bool run (const CodedFrames &frames, bool deviations, Workers &workers,
+        std::stop_token stop);
+  };
+
+  explicit Overlap (int slots) : slots_ (slots) {}
   const float *mix (std::vector<Field> Fused::*which, int slot, int y,
       const float *own, const float *is_static);
 
   int slots_;
-  int first_; ///< slot of a coded frame in which such an exposure begins
-  FieldOf<std::uint8_t> late_; ///< pixels whose slot is not before that one
-  std::unique_ptr<Engine> engine_;
-  Fused before_, after_; ///< the middle of the last coded frame
+  std::vector<Between> between_;
 };
 
 } // namespace codedexposure::fuse

@@ -128,7 +128,7 @@ def fuse_array(coded: np.ndarray, schedule: Schedule,
                quality: str = "balanced", *, rate: float | Fraction = 25,
                full_well: float | None = None, read_noise: float | None = None,
                mapping: str | os.PathLike | dict | None = None,
-               bits: int | None = None, overlap: bool = False) -> np.ndarray:
+               bits: int | None = None, overlap: int | None = None) -> np.ndarray:
     """Full-size frames at N times the rate; arguments are as for decode_array
     and Recording.fused.
 
@@ -136,5 +136,5 @@ def fuse_array(coded: np.ndarray, schedule: Schedule,
     """
     fuse = element("codedexposure-fuse", schedule=schedule, quality=quality,
                    lookahead=1, full_well=full_well, read_noise=read_noise,
-                   mapping=mapping, bits=bits, overlap=overlap or None)
+                   mapping=mapping, bits=bits, overlap=overlap)
     return _in_slots(list(_play(coded, rate, fuse)), len(coded))

@@ -95,7 +95,7 @@ class Recording:
               range: int | None = None,  # pylint: disable=redefined-builtin
               schedule: str | os.PathLike | dict | None = None,
               mapping: str | os.PathLike | dict | None = None,
-              bits: int | None = None, overlap: bool = False) -> Frames:
+              bits: int | None = None, overlap: int | None = None) -> Frames:
         """Full-size frames at the rate of the subframes.
 
         quality     fast, balanced, best or learned
@@ -106,9 +106,9 @@ class Recording:
         range       of both cameras: white of the frames in whites of the first
                     one, whose saturated pixels are seen by the second behind a
                     filter
-        overlap     fuse the exposures between coded frames as well, which makes
-                    the first and last slots of a frame as true as the others,
-                    in twice the time
+        overlap     exposures that are fused for each coded frame, 1 to 4; beyond
+                    1, those between two frames make the first and last slots
+                    as true as the others, in as many times the time
         The rest is as for subframes ().
         """
         fuse = self._fuse(quality, full_well, read_noise, range, schedule,
@@ -127,7 +127,7 @@ class Recording:
                     range: int | None = None,  # pylint: disable=redefined-builtin
                     schedule: str | os.PathLike | dict | None = None,
                     mapping: str | os.PathLike | dict | None = None,
-                    bits: int | None = None, overlap: bool = False) -> Frames:
+                    bits: int | None = None, overlap: int | None = None) -> Frames:
         """How uncertain each pixel of fused () is, with the same arguments:
         frames whose image has half the width of the interval that holds 68 %
         of the errors, in 1/65280 of white.
@@ -144,7 +144,7 @@ class Recording:
             "codedexposure-fuse", name="fuse", lookahead=1,
             require_schedule=True, quality=quality, full_well=full_well,
             read_noise=read_noise, range=white, schedule=schedule,
-            mapping=mapping, bits=bits, overlap=overlap or None)
+            mapping=mapping, bits=bits, overlap=overlap)
 
     def coded(self) -> Frames:
         """The coded frames as the camera delivered them."""

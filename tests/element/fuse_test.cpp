@@ -201,11 +201,11 @@ TEST_F (Fuse, FramesWithDarkBetweenThemDoNotOverlap)
   FuseOptions options;
   options.lookahead = 1;
   const auto alone = expected ("sequential:2x2", {0, 1, 2}, options);
-  options.overlap = true;
+  options.overlap = 2;
   const auto both = expected ("sequential:2x2", {0, 1, 2}, options);
   EXPECT_FALSE (both == alone);
   const auto fused = [&] (const std::string &times) {
-    start ("schedule=sequential:2x2" + times + " lookahead=1 overlap=true");
+    start ("schedule=sequential:2x2" + times + " lookahead=1 overlap=2");
     for (int number : {0, 1, 2})
       push (number);
     fuse->push_event (gst_event_new_eos ());
@@ -222,7 +222,7 @@ TEST_F (Fuse, FramesWithDarkBetweenThemDoNotOverlap)
 
 TEST_F (Fuse, OverlapNeedsTheNextFrame)
 {
-  start ("schedule=sequential:2x2 overlap=true");
+  start ("schedule=sequential:2x2 overlap=2");
   EXPECT_EQ (fuse->push (frame_of (picture (0), 0)), GST_FLOW_NOT_NEGOTIATED);
   EXPECT_NE (fuse->error ().find ("set lookahead to 1"), std::string::npos);
 }

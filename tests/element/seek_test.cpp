@@ -246,9 +246,9 @@ INSTANTIATE_TEST_SUITE_P (Of, Excerpts,
         Case{"fast", "codedexposure-fuse", 40},
         Case{"fast_ahead", "codedexposure-fuse lookahead=1", 40},
         Case{"fast_noise", "codedexposure-fuse lookahead=1 full-well=8000", 60},
-        Case{"overlap", "codedexposure-fuse lookahead=1 overlap=true", 30},
+        Case{"overlap", "codedexposure-fuse lookahead=1 overlap=2", 30},
         Case{"overlap_noise",
-            "codedexposure-fuse lookahead=1 overlap=true full-well=8000", 30}),
+            "codedexposure-fuse lookahead=1 overlap=3 full-well=8000", 30}),
     name_of);
 
 /* These take long. */

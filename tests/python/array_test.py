@@ -64,10 +64,10 @@ class Arrays(unittest.TestCase):
 
     def test_overlap(self):
         frames = codedexposure.fuse_array(self.coded, "sequential:2x2", "fast",
-                                          overlap=True)
+                                          overlap=2)
         both, alone = (pixels(self.recording.fused(
             "fast", schedule="sequential:2x2", overlap=overlap))
-            for overlap in (True, False))
+            for overlap in (2, 1))
         self.assertTrue(frames.tobytes() == both)
         self.assertFalse(both == alone)
 

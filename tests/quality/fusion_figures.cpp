@@ -52,12 +52,12 @@ rank_way (int n, bool normalised)
 
 FusionWay
 fusion_way (int n, FuseQuality quality, bool refine = false, int lookahead = 0,
-    const std::string &leak = "0", bool overlap = false)
+    const std::string &leak = "0", int overlap = 1)
 {
   return {std::string (quality_name (quality)) + (refine ? ", refined" : "") +
-              (overlap        ? ", overlap"
-                  : lookahead ? ", lookahead"
-                              : ""),
+              (overlap > 1    ? ", overlap " + std::to_string (overlap)
+                  : lookahead ? std::string (", lookahead")
+                              : std::string ()),
       [=] (const Scene &scene, const Condition &condition) {
         const Schedule schedule = fusion_schedule (n, leak);
         FuseOptions options = options_of (quality, condition);
@@ -106,9 +106,9 @@ lone_way (int n, FuseQuality quality)
 }
 
 FusionWay
-overlap_way (int n, FuseQuality quality, bool refine)
+overlap_way (int n, FuseQuality quality, bool refine, int overlap)
 {
-  return fusion_way (n, quality, refine, 1, "0", true);
+  return fusion_way (n, quality, refine, 1, "0", overlap);
 }
 
 /* Those of sequences: files are fused with lookahead. */
@@ -125,9 +125,10 @@ sequence_ways (int n)
   all.push_back (fusion_way (n, FuseQuality::kFast, true, 1));
   all.push_back (fusion_way (n, FuseQuality::kBalanced, true, 1));
   all.push_back (fusion_way (n, FuseQuality::kLearned, false, 1));
-  all.push_back (overlap_way (n, FuseQuality::kBalanced, false));
-  all.push_back (overlap_way (n, FuseQuality::kBalanced, true));
-  all.push_back (overlap_way (n, FuseQuality::kLearned, false));
+  all.push_back (overlap_way (n, FuseQuality::kBalanced, false, 2));
+  all.push_back (overlap_way (n, FuseQuality::kBalanced, true, 2));
+  for (const int overlap : {2, 4})
+    all.push_back (overlap_way (n, FuseQuality::kLearned, false, overlap));
   return all;
 }
 

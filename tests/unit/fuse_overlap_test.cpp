@@ -16,14 +16,14 @@ overlapping (FuseQuality quality, bool noisy = false)
 {
   FuseOptions options = with_quality (quality, noisy);
   options.lookahead = 1;
-  options.overlap = true;
+  options.overlap = 2;
   return options;
 }
 
 FuseOptions
 apart (FuseOptions options)
 {
-  options.overlap = false;
+  options.overlap = 1;
   return options;
 }
 
@@ -199,6 +199,12 @@ TEST (FuseOverlap, SaysWhyThereIsNone)
   ASSERT_FALSE (refused);
   EXPECT_NE (
       refused.error ().message.find ("set lookahead to 1"), std::string::npos);
+  live.overlap = 5;
+  EXPECT_EQ (
+      Fuser<std::uint8_t>::make (schedule_of ("sequential:2x2"), 8, 8, live)
+          .error ()
+          .message,
+      "overlap 5: 1 to 4 exposures are fused for each coded frame");
 }
 
 TEST (FuseOverlap, BeginsAnewAfterAStop)

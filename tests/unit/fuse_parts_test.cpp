@@ -89,7 +89,7 @@ TEST (Fuse, APartThatOverlapsIsFusedAsInTheWhole)
   for (const bool noisy : {false, true}) {
     FuseOptions options = with_quality (FuseQuality::kFast, noisy);
     options.lookahead = 1;
-    options.overlap = true;
+    options.overlap = 3;
     expect_parts_as_whole (coded, schedule, options, {3, 19});
     options.refine = true;
     const Pictures<> some (coded.begin (), coded.begin () + 6);

@@ -16,7 +16,8 @@ LONGEST = 60  # s of the second
 
 def overlap(plan):
     """Coded frames that a chunk reads beside its own; as in decode."""
-    return 18 if any(o.startswith('--fuse') for o in plan.options) else 2
+    given = {o.split('=')[0] for o in plan.options}
+    return 18 + ('--overlap' in given) if '--fuse' in given else 2
 
 
 def decode(plan, times, frames):

@@ -11,8 +11,8 @@ from .store import Problem, fingerprint
 FORMAT, VERSION = 'coded-exposure-archive', 2
 # Options of decode with a value; others are flags.
 VALUED = {'method', 'mapping', 'fuse', 'bench', 'full-well', 'read-noise',
-          'range', 'region', 'schedule', 'second', 'bits', 'white'}
-FLAGS = {'view', 'verbose', 'refine', 'overlap', 'deflate'}
+          'range', 'overlap', 'region', 'schedule', 'second', 'bits', 'white'}
+FLAGS = {'view', 'verbose', 'refine', 'deflate'}
 FILES = {'mapping', 'bench', 'schedule'}  # values that may be files
 FORMS = {'mkv': '.mkv', 'png': '/', 'mp4': '.mp4', 'ome.tif': '.ome.tif',
          'h5': '.h5'}

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdlib>
 
 #include "base/pixels.h"
 #include "base/text.h"
@@ -11,6 +10,7 @@
 #include "base/view_check.h"
 #include "fuse/beyond_white.h"
 #include "fuse/clipped.h"
+#include "fuse/covers.h"
 #include "fuse/engine.h"
 #include "fuse/light_ratio.h"
 #include "fuse/overlap.h"
@@ -38,66 +38,6 @@ struct Piece {
   std::unique_ptr<fuse::Engine> engine;
   std::unique_ptr<fuse::Overlap> overlap; ///< none: see unoverlapped
 };
-
-/** A pixel of the background that a region covers, and the pixel of the same
- * element that replaces it. */
-struct Cover {
-  Offset at, from;
-};
-
-/** The shortest distance, a multiple of @p period, that leads from @p at out of
- * [from, to): to the left, or to the right if @p right. */
-int
-distance_out (int at, int from, int to, int period, bool right)
-{
-  return right ? ((to - 1 - at) / period + 1) * period
-               : -((at - from) / period + 1) * period;
-}
-
-/** The nearest pixel of the same element, whole periods of the tile to one
- * side, that no region covers; the pixel itself if there is none. */
-Offset
-uncovered_pixel (const Schedule &schedule, Extent size, Offset at)
-{
-  const Tile &tile = schedule.tile ();
-  const Rect frame{0, 0, size.width, size.height};
-  Offset best = at;
-  int shortest = size.width + size.height;
-  for (const bool across : {true, false}) {
-    for (const bool forward : {true, false}) {
-      Offset place = at;
-      while (frame.holds (place.x, place.y)) {
-        const int i = schedule.region_at (place.x, place.y);
-        const int away = std::abs (place.x - at.x) + std::abs (place.y - at.y);
-        if (i < 0 && away < shortest) {
-          shortest = away;
-          best = place;
-        }
-        if (i < 0)
-          break;
-        const Rect &rect = schedule.regions ()[std::size_t (i)].rect;
-        if (across)
-          place.x += distance_out (
-              place.x, rect.x, rect.right (), tile.period_x (), forward);
-        else
-          place.y += distance_out (
-              place.y, rect.y, rect.bottom (), tile.period_y (), forward);
-      }
-    }
-  }
-  return best;
-}
-
-std::vector<Cover>
-find_covers (const Schedule &schedule, Extent size)
-{
-  std::vector<Cover> covers;
-  for (const Region &region : schedule.regions ())
-    for (int y = region.rect.y; y < region.rect.bottom (); y++)
-      for (int x = region.rect.x; x < region.rect.right (); x++)
-        covers.push_back ({{x, y}, uncovered_pixel (schedule, size, {x, y})});
-  return covers;
-}
 
 /* A part of a schedule, or of its complement; -1: the background. */
 Schedule
@@ -202,7 +142,7 @@ template <typename Pixel>
 struct Fuser<Pixel>::State {
   /** The background, or the whole frame, and the regions. */
   std::vector<Piece> pieces;
-  std::vector<Cover> covers;
+  std::vector<fuse::Cover> covers;
   int slots;
   int history;
   std::string unoverlapped;
@@ -519,7 +459,7 @@ try {
                                   {width, height}, options, std::move (stop)));
   }
   auto state = std::make_shared<State> (State{std::move (pieces),
-      find_covers (schedule, {width, height - schedule.pilot_rows ()}),
+      fuse::find_covers (schedule, {width, height - schedule.pilot_rows ()}),
       schedule.slots (), history, std::move (unoverlapped), float (largest),
       wanted.partner, float (wanted.partner_black), wanted.range,
       std::move (beyond),

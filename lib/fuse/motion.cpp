@@ -71,6 +71,14 @@ find_runs (const float *values, int count, std::vector<Run> &runs)
   }
 }
 
+double
+median_of (std::vector<double> values)
+{
+  const auto middle = values.begin () + std::ptrdiff_t (values.size () / 2);
+  std::ranges::nth_element (values, middle);
+  return *middle;
+}
+
 } // namespace
 
 /* Of a thread: rows first .. first + rows - 1 of the blocks of a frame. */
@@ -128,14 +136,14 @@ public:
     }
     classes_++;
   }
-  void set (FilterBank &bank, int row, int x, int group) const
+  void set (FilterBank &bank, int row, int x, int group, float scale) const
   {
     std::vector<Tap> taps;
     std::vector<float> weights (weights_.size () * classes_);
     for (const auto &[place, of_classes] : weights_) {
       const auto [frame, tap_y, tap_x] = place;
       for (std::size_t c = 0; c < classes_; c++)
-        weights[c * weights_.size () + taps.size ()] = of_classes[c];
+        weights[c * weights_.size () + taps.size ()] = scale * of_classes[c];
       taps.push_back ({tap_x, tap_y, frame});
     }
     bank.set (row, x, group, taps, weights);
@@ -151,36 +159,56 @@ private:
  * patch, pixels are predicted well and the gaps between these places are not.
  * Errors therefore count by how much larger the class expects those of the
  * slots to be. Half of this ratio's logarithm, as gaps are easier to fill than
- * the class says where light changes along one direction only. */
+ * the class says where light changes along one direction only.
+ *
+ * With a partner, its pixels are predicted as well, and the error is the mean
+ * of both, each in units of what the classes expect of it. */
 MotionFilter::Set
 MotionFilter::make_set (std::span<const SceneClass> classes,
     std::span<const Tap> taps, std::size_t per_neighbour) const
 {
   const std::size_t chunks = (classes.size () + kChunk - 1) / kChunk;
-  Set set{{}, FilterBank (plan_, int (chunks)),
+  Set set{{}, FilterBank (plan_, int (chunks)), {},
       FilterBank (plan_, int (classes.size ())), {}};
-  std::map<std::pair<int, int>, Chunk> residuals; // of each phase
+  /* Of each phase and chunk. */
+  std::map<std::array<int, 3>, Chunk> residuals, of_partner;
+  std::vector<double> sought, predicted, partner;
   for (std::size_t c = 0; c < classes.size (); c++) {
-    double predicted = 0.0, sought = 0.0;
+    const int chunk = int (c / kChunk);
+    for (std::vector<double> *sum : {&sought, &predicted, &partner})
+      sum->push_back (0.0);
     for_each_phase (
         plan_, classes[c], taps,
         [&] (int row, int x, std::span<const Tap> used,
             const PhaseWeights &weights) {
           set.filters.set (row, x, int (c), used, weights.slots);
-          residuals[{row, x}].add (used, weights.residual);
-          predicted += weights.predicted_variance;
-          sought += std::accumulate (weights.slot_variances.begin (),
-                        weights.slot_variances.end (), 0.0) /
-                    plan_.observation.slots ();
+          residuals[{row, x, chunk}].add (used, weights.residual);
+          predicted.back () += weights.predicted_variance;
+          partner.back () += weights.partner_variance;
+          if (!weights.partner_residual.empty ())
+            of_partner[{row, x, chunk}].add (used, weights.partner_residual);
+          sought.back () += std::accumulate (weights.slot_variances.begin (),
+                                weights.slot_variances.end (), 0.0) /
+                            plan_.observation.slots ();
         },
         per_neighbour);
-    set.factors.push_back (float (std::sqrt (sought / predicted)));
-    if (c + 1 < classes.size () && (c + 1) % kChunk != 0)
-      continue;
-    for (const auto &[place, chunk] : residuals)
-      chunk.set (set.residuals, place.first, place.second, int (c / kChunk));
-    residuals.clear ();
   }
+  const double ratio =
+      of_partner.empty () ? 0.0 : median_of (predicted) / median_of (partner);
+  const double part = of_partner.empty () ? 1.0 : 0.5;
+  const auto set_bank = [] (FilterBank &bank, const auto &chunks_of,
+                            double by) {
+    for (const auto &[place, chunk] : chunks_of)
+      chunk.set (bank, place[0], place[1], place[2], float (std::sqrt (by)));
+  };
+  set_bank (set.residuals, residuals, part);
+  if (!of_partner.empty ()) {
+    set.of_partner.emplace (plan_, int (chunks));
+    set_bank (*set.of_partner, of_partner, part * ratio);
+  }
+  for (std::size_t c = 0; c < classes.size (); c++)
+    set.factors.push_back (float (
+        std::sqrt (sought[c] / (part * (predicted[c] + ratio * partner[c])))));
   return set;
 }
 
@@ -225,8 +253,7 @@ MotionFilter::sets_for (Neighbours neighbours)
 /* The squared residuals of a chunk of classes in row @y of pixels. */
 void
 MotionFilter::measure_row (const Kernels &kernels, const CodedFrames &frames,
-    const FilterBank &residuals, int group, int y, float *const *to,
-    Room &room) const
+    const Set &set, int group, int y, float *const *to, Room &room) const
 {
   const int period = plan_.sources.period ();
   const auto sources = plan_.sources.row (frames, y, room.sources[0]);
@@ -236,14 +263,16 @@ MotionFilter::measure_row (const Kernels &kernels, const CodedFrames &frames,
   for (int k = 0; k < int (kChunk); k++)
     std::fill_n (room.parts.row (k), room.parts.width (), 0.0f);
   int outputs = 0;
-  for (int column = 0; column < period; column++) {
-    const FilterRow row =
-        residuals.row (phases[column], column, group, sources, {&whole, 1});
-    outputs = row.outputs;
-    for (int k = 0; k < outputs; k++)
-      parts[std::size_t (k)] = room.parts.row (k) + column * room.part;
-    kernels.filter_squared (row, parts.data ());
-  }
+  for (const FilterBank *bank :
+      {&set.residuals, set.of_partner ? &*set.of_partner : nullptr})
+    for (int column = 0; bank && column < period; column++) {
+      const FilterRow row =
+          bank->row (phases[column], column, group, sources, {&whole, 1});
+      outputs = row.outputs;
+      for (int k = 0; k < outputs; k++)
+        parts[std::size_t (k)] = room.parts.row (k) + column * room.part;
+      kernels.filter_squared (row, parts.data ());
+    }
   for (int k = 0; k < outputs; k++)
     kernels.join ({period, room.part, frames.now->light.width ()},
         room.parts.row (k), nullptr, to[k]);
@@ -252,7 +281,7 @@ MotionFilter::measure_row (const Kernels &kernels, const CodedFrames &frames,
 /* The same in all blocks of the room's rows and around them. */
 void
 MotionFilter::measure_blocks (const Kernels &kernels, const CodedFrames &frames,
-    const FilterBank &residuals, int group, Room &room) const
+    const Set &set, int group, Room &room) const
 {
   const int width = frames.now->light.width ();
   const int height = frames.now->light.height ();
@@ -261,7 +290,7 @@ MotionFilter::measure_blocks (const Kernels &kernels, const CodedFrames &frames,
     for (std::size_t i = 0; i < 2 * kChunk; i++)
       to[i] = room.squares.row (int (i));
     for (const int half : {0, 1})
-      measure_row (kernels, frames, residuals, group,
+      measure_row (kernels, frames, set, group,
           mirrored (2 * (room.first + y) + half, height),
           to.data () + (half ? kChunk : 0), room);
     for (std::size_t i = 0; i < kChunk; i++) {
@@ -284,7 +313,7 @@ MotionFilter::measure (const Kernels &kernels, const CodedFrames &frames,
 {
   for (std::size_t c = 0; c < set.factors.size (); c++) {
     if (c % kChunk == 0)
-      measure_blocks (kernels, frames, set.residuals, int (c / kChunk), room);
+      measure_blocks (kernels, frames, set, int (c / kChunk), room);
     const Field &sums = room.sums[c % kChunk];
     for (int y = -kReach; y < room.rows + kReach; y++)
       blur (kernels, sums.row (y), 1, room.blocks, room.along.row (y + kReach));

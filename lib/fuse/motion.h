@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -45,7 +46,8 @@ private:
   struct Set {
     std::vector<float> factors; ///< of the squared error of each class
     FilterBank residuals;       ///< a group has kChunk classes
-    FilterBank filters;         ///< a group is a class, its outputs are slots
+    std::optional<FilterBank> of_partner; ///< residuals of its pixels, likewise
+    FilterBank filters; ///< a group is a class, its outputs are slots
     /** Of followers: the number of each among the classes of the frame. */
     std::vector<std::size_t> followed;
   };
@@ -59,10 +61,9 @@ private:
 
   struct Room;
   void measure_row (const Kernels &kernels, const CodedFrames &frames,
-      const FilterBank &residuals, int group, int y, float *const *to,
-      Room &room) const;
+      const Set &set, int group, int y, float *const *to, Room &room) const;
   void measure_blocks (const Kernels &kernels, const CodedFrames &frames,
-      const FilterBank &residuals, int group, Room &room) const;
+      const Set &set, int group, Room &room) const;
   void measure (const Kernels &kernels, const CodedFrames &frames,
       const Set &set, std::size_t first, Room &room) const;
   void set_weights (const Kernels &kernels, Room &room, Field &misfit) const;

@@ -280,17 +280,33 @@ PhaseWeights
 Equations::weights ()
 {
   const std::size_t m = taps_.size (), n = std::size_t (slots ());
-  system_.flat_targets.push_back (0.0);
-  system_.targets.resize ((n + 1) * m);
-  system_.targets[n * m + middle_] = 1.0;
+  const auto partner = std::size_t (
+      std::ranges::find (taps_, Tap{0, 0, kPartner}) - taps_.begin ());
+  const auto leave_out = [&] (std::size_t tap) {
+    system_.flat_targets.push_back (0.0);
+    system_.targets.resize (system_.targets.size () + m);
+    system_.targets[system_.targets.size () - m + tap] = 1.0;
+  };
+  leave_out (middle_);
+  if (partner < m)
+    leave_out (partner);
   const std::vector<double> solved = solve_kriging (system_);
-  const double *residual = solved.data () + n * m;
+  const double *row = solved.data () + n * m;
   PhaseWeights weights;
-  weights.slots.assign (solved.data (), residual);
+  weights.slots.assign (solved.data (), row);
   keep_known (weights.slots);
-  for (std::size_t i = 0; i < m; i++)
-    weights.residual.push_back (float (-residual[i] / residual[middle_]));
-  weights.predicted_variance = 1.0 / residual[middle_];
+  const auto prediction = [m] (const double *of_row, std::size_t tap) {
+    std::vector<float> residual;
+    for (std::size_t i = 0; i < m; i++)
+      residual.push_back (float (-of_row[i] / of_row[tap]));
+    return residual;
+  };
+  weights.residual = prediction (row, middle_);
+  weights.predicted_variance = 1.0 / row[middle_];
+  if (partner < m) {
+    weights.partner_residual = prediction (row + m, partner);
+    weights.partner_variance = 1.0 / row[m + partner];
+  }
   for (std::size_t slot = 0; slot < n; slot++)
     weights.slot_variances.push_back (slot_variance (slot, solved));
   return weights;

@@ -146,11 +146,12 @@ struct FilterPlan {
 struct PhaseWeights {
   /** Weight of tap i for slot s at [s * taps + i]. */
   std::vector<float> slots;
-  /** Prediction of the middle pixel from all others, less that pixel. */
-  std::vector<float> residual;
-  /** Expected squared errors, in units of the scene's variance: of that
-   * prediction, and of each slot. */
-  double predicted_variance = 0.0;
+  /** Prediction of the middle pixel from all others, less that pixel, and of
+   * that of the partner; empty if there is none. */
+  std::vector<float> residual, partner_residual;
+  /** Expected squared errors, in units of the scene's variance: of these
+   * predictions, and of each slot. */
+  double predicted_variance = 0.0, partner_variance = 0.0;
   std::vector<double> slot_variances;
 };
 

@@ -110,6 +110,21 @@ TEST (FusePartner, MotionGainsAtEveryQuality)
   }
 }
 
+/* By the pixels of the first camera alone, it is 27.5 and 25.3 dB. */
+TEST (FusePartner, ItsPixelsTellWhichMotionFits)
+{
+  const Schedule schedule = schedule_of (kPreset);
+  const auto fused = [&] (double speed) {
+    const auto slots = truth (3, schedule.slots (), speed);
+    return psnr (fuse (schedule, coded (schedule, slots),
+                     coded (schedule.complement ().value (), slots),
+                     with_partner (FuseQuality::kBalanced)),
+        slots);
+  };
+  EXPECT_GT (fused (0.5), 28.5);
+  EXPECT_GT (fused (3.0), 25.5);
+}
+
 /* The gain of the second camera is measured, and its black level need not be
  * exact. */
 TEST (FusePartner, GainAndBlackLevelAreNotNeeded)

@@ -15,6 +15,9 @@ using namespace codedexposure;
 using namespace codedexposure::test;
 using namespace codedexposure::test::two_beams;
 
+constexpr FuseQuality kQualities[] = {FuseQuality::kFast,
+    FuseQuality::kBalanced, FuseQuality::kBest, FuseQuality::kLearned};
+
 /* @partners: none, or one for each frame; an empty one is lost. */
 Pictures
 fuse (const Schedule &schedule, const Pictures &frames,
@@ -59,10 +62,7 @@ psnr (const Pictures &fused, const Pictures &truth)
 FuseOptions
 with_partner (FuseQuality quality = FuseQuality::kFast)
 {
-  FuseOptions options;
-  options.quality = quality;
-  options.partner = true;
-  return options;
+  return {.quality = quality, .partner = true};
 }
 
 bool
@@ -84,8 +84,7 @@ TEST (FusePartner, AStaticSceneIsSharpInTheFirstFrame)
   const auto slots = truth (1, schedule.slots (), 0.0);
   const auto frames = coded (schedule, slots);
   const auto partners = coded (schedule.complement ().value (), slots);
-  FuseOptions alone;
-  alone.quality = FuseQuality::kBalanced;
+  const FuseOptions alone{.quality = FuseQuality::kBalanced};
   const double one = psnr (fuse (schedule, frames, {}, alone), slots);
   const double both = psnr (
       fuse (schedule, frames, partners, with_partner (alone.quality)), slots);
@@ -99,10 +98,8 @@ TEST (FusePartner, MotionGainsAtEveryQuality)
   const auto slots = truth (3, schedule.slots (), 1.3);
   const auto frames = coded (schedule, slots);
   const auto partners = coded (schedule.complement ().value (), slots);
-  for (const FuseQuality quality : {FuseQuality::kFast, FuseQuality::kBalanced,
-           FuseQuality::kBest, FuseQuality::kLearned}) {
-    FuseOptions alone;
-    alone.quality = quality;
+  for (const FuseQuality quality : kQualities) {
+    const FuseOptions alone{.quality = quality};
     const double one = psnr (fuse (schedule, frames, {}, alone), slots);
     const double both =
         psnr (fuse (schedule, frames, partners, with_partner (quality)), slots);
@@ -254,8 +251,7 @@ expect_alone_left_of (int columns, const Schedule &schedule,
   constexpr int kReach = 16;
   for (const FuseQuality quality :
       {FuseQuality::kFast, FuseQuality::kBalanced, FuseQuality::kBest}) {
-    FuseOptions alone;
-    alone.quality = quality;
+    const FuseOptions alone{.quality = quality};
     const auto one = fuse (schedule, frames, {}, alone);
     const auto both = fuse (schedule, frames, partners, with_partner (quality));
     ASSERT_EQ (both.size (), one.size ());
@@ -382,14 +378,12 @@ TEST (FusePartner, RangesAreNotRefined)
 
 TEST (FusePartner, AFrameWithoutItsPartnerIsThatOfOneCamera)
 {
-  for (const FuseQuality quality : {FuseQuality::kFast, FuseQuality::kBalanced,
-           FuseQuality::kBest, FuseQuality::kLearned}) {
+  for (const FuseQuality quality : kQualities) {
     const Schedule schedule = schedule_of (kPreset);
     const auto slots = truth (4, schedule.slots (), 1.3);
     const auto frames = coded (schedule, slots);
     auto partners = coded (schedule.complement ().value (), slots);
-    FuseOptions alone;
-    alone.quality = quality;
+    const FuseOptions alone{.quality = quality};
     const auto one = fuse (schedule, frames, {}, alone);
     EXPECT_TRUE (
         equal (fuse (schedule, frames, {}, with_partner (quality)), one));
@@ -419,10 +413,8 @@ TEST (FusePartner, WhereItIsSaturatedTheFirstCameraIsAlone)
   for (int y = kLamp.y; y < kLamp.bottom (); y++)
     for (int x = kLamp.x; x < kLamp.right (); x++)
       dazzled[1].at (x, y) = 255;
-  for (const FuseQuality quality : {FuseQuality::kFast, FuseQuality::kBalanced,
-           FuseQuality::kBest, FuseQuality::kLearned}) {
-    FuseOptions alone;
-    alone.quality = quality;
+  for (const FuseQuality quality : kQualities) {
+    const FuseOptions alone{.quality = quality};
     const auto one = fuse (schedule, frames, {}, alone);
     const auto both = fuse (schedule, frames, partners, with_partner (quality));
     const auto some = fuse (schedule, frames, dazzled, with_partner (quality));
@@ -561,8 +553,7 @@ TEST (FusePartner, AllTargetsAndThreadsAgree)
   const auto slots = truth (2, schedule.slots (), 1.3);
   const auto frames = coded (schedule, slots);
   const auto partners = coded (schedule.complement ().value (), slots);
-  for (const FuseQuality quality : {FuseQuality::kFast, FuseQuality::kBalanced,
-           FuseQuality::kBest, FuseQuality::kLearned}) {
+  for (const FuseQuality quality : kQualities) {
     FuseOptions options = with_partner (quality);
     options.threads = 1;
     const auto expected = fuse (schedule, frames, partners, options);

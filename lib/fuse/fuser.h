@@ -55,7 +55,7 @@ struct FuseOptions {
   int overlap = 1;
   /** Significant bits of a pixel, 1..8 or 1..16; 0: all that the type has. */
   int bits = 0;
-  SensorNoise noise;
+  SensorNoise noise = {};
   /** Threads, 1..64; 0: one per processor, and for fast without refine, only
    * the caller's. The pixels do not depend on it. */
   int threads = 0;

@@ -366,7 +366,8 @@ Fuse::plan (const CodedFormat &format)
         "The result is not refined: " + reason + ".");
   if (const std::string reason = unoverlapped (); !reason.empty ())
     POST_WARNING (element (), STREAM, FORMAT,
-        "The exposures between coded frames are not used: " + reason + ".");
+        "The exposures between coded frames are not used: " + reason +
+            ". Leave overlap at 1.");
   take_caps (std::move (caps));
   return true;
 }

@@ -46,11 +46,20 @@ part_of (const Schedule &schedule, int region)
   return region < 0 ? schedule.background () : schedule.region (region);
 }
 
-/* @unoverlapped: gets why a piece has no Overlap. */
+/* All parts overlap or none does, so that one word is true of the frame. */
+std::string
+why_no_overlap (const Schedule &schedule, const FuseOptions &options)
+{
+  std::string why_not;
+  for (int i = -1; i < int (schedule.regions ().size ()) && why_not.empty ();
+       i++)
+    why_not = fuse::Overlap::why_not (part_of (schedule, i), options);
+  return why_not;
+}
+
 Result<std::vector<Piece>>
 make_pieces (const Schedule &schedule, int width, int height,
-    const FuseOptions &options, double largest, std::stop_token stop,
-    std::string &unoverlapped)
+    const FuseOptions &options, double largest, std::stop_token stop)
 {
   std::optional<Schedule> complement;
   if (options.partner) {
@@ -71,11 +80,6 @@ make_pieces (const Schedule &schedule, int width, int height,
         Piece{rect, schedule.slots () / part.slots (), std::move (engine), {}});
     if (options.overlap == 1)
       continue;
-    const std::string why_not = fuse::Overlap::why_not (part, options);
-    if (!why_not.empty ()) {
-      unoverlapped = why_not;
-      continue;
-    }
     ASSIGN_OR_RETURN (piece.overlap, fuse::Overlap::make (part, rect.width,
                                          rect.height, options, largest, stop));
   }
@@ -445,11 +449,14 @@ try {
   const int largest = largest_pixel_of<Pixel> (options.bits);
   RETURN_IF_ERROR (schedule.check_size (width, height));
   std::string unoverlapped;
-  ASSIGN_OR_RETURN (auto pieces, make_pieces (schedule, width, height, options,
-                                     largest, stop, unoverlapped));
+  if (options.overlap > 1)
+    unoverlapped = why_no_overlap (schedule, options);
+  if (!unoverlapped.empty ())
+    options.overlap = 1;
+  ASSIGN_OR_RETURN (auto pieces,
+      make_pieces (schedule, width, height, options, largest, stop));
   int history = options.noise.full_well > 0.0 ? fuse::StaticPixels::kMemory : 1;
-  if (std::ranges::any_of (
-          pieces, [] (const Piece &piece) { return piece.overlap != nullptr; }))
+  if (options.overlap > 1)
     history += fuse::Overlap::kHistory;
   static_assert (
       fuse::StaticPixels::kMemory + fuse::Overlap::kHistory == kMaxHistory);

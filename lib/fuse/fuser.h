@@ -119,8 +119,8 @@ public:
    * kMaxHistory. Fused with as many before it, and lookahead after it, a part
    * of a stream gives the same pixels as the whole. */
   int history () const;
-  /** Why frames, or a region of them, do not overlap although the options say
-   * so; empty if they do, or should not. */
+  /** Why exposures do not overlap although the options say so; empty if they
+   * do, or should not. */
   std::string unoverlapped () const;
   /** Why frames, or a region of them, are not refined although the options say
    * so: the schedule or the noise is not among those of the training. Empty if

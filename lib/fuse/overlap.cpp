@@ -36,7 +36,7 @@ Overlap::why_not (const Schedule &schedule, const FuseOptions &options)
   const std::string text = schedule.text ();
   if (options.partner)
     return "the frames of a second camera cannot be divided into slots";
-  if (!schedule.code ().one_hot () || schedule.slots () < 2)
+  if (!schedule.code ().one_hot ())
     return text + " has pixels that see more than one slot, which cannot be "
                   "divided";
   if (schedule.leak () > kMaxLeak)

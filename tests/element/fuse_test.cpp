@@ -217,7 +217,7 @@ TEST_F (Fuse, FramesWithDarkBetweenThemDoNotOverlap)
   EXPECT_EQ (fuse->warning (),
       "The exposures between coded frames are not used: there is no light for "
       "4ms from one exposure to the next; it must be a quarter of a slot at "
-      "most, 2.25ms.");
+      "most, 2.25ms. Leave overlap at 1.");
 }
 
 TEST_F (Fuse, OverlapNeedsTheNextFrame)

@@ -141,6 +141,23 @@ TEST (FuseOverlap, RegionsHaveTheirOwn)
         ASSERT_EQ (both[slot].at (x, y), both[slot + 1].at (x, y)) << slot;
 }
 
+/* What is said of the frames holds everywhere in them. */
+TEST (FuseOverlap, WhereARegionCannotNothingDoes)
+{
+  const char *preset =
+      "sequential:lattice:4/2,region=32x32+32+16:staircase:lattice:2/1";
+  const Schedule schedule = schedule_of (preset);
+  const auto coded =
+      take (schedule, 3, [] (int slot) { return moving (1.0, slot); });
+  const FuseOptions options = overlapping (FuseQuality::kFast);
+  EXPECT_TRUE (fuse (coded, schedule, options) ==
+               fuse (coded, schedule, apart (options)));
+  EXPECT_NE (Fuser<std::uint8_t>::make (schedule, 96, 64, options)
+                 ->unoverlapped ()
+                 .find ("staircase:lattice:2/1"),
+      std::string::npos);
+}
+
 TEST (FuseOverlap, SaysHowUncertainBothAreTogether)
 {
   const Schedule schedule = schedule_of ("sequential:lattice:4/2");

@@ -33,7 +33,7 @@ PartnerReader::make (const PartnerSetup &partner, const CodedFormat &format,
 
 template <typename Pixel>
 Result<std::optional<ImageView<const Pixel>>>
-PartnerReader::read (GstBuffer *coded, int bits)
+PartnerReader::read (GstBuffer *coded, int bits, Image<float> *errors)
 {
   using View = ImageView<const Pixel>;
   mapped_.reset ();
@@ -55,14 +55,19 @@ PartnerReader::read (GstBuffer *coded, int bits)
   const auto [width, height] = rectifier_->mirrors ();
   if (image.width () != width || image.height () != height)
     image = Image<Pixel> (width, height);
+  std::optional<ImageView<float>> wanted;
+  if (errors) {
+    *errors = Image<float> (width, height);
+    wanted = errors->view ();
+  }
   RETURN_IF_ERROR (rectifier_->run (
-      seen, image.view (), bits > 0 ? largest_pixel (bits) : 0));
+      seen, image.view (), bits > 0 ? largest_pixel (bits) : 0, wanted));
   return std::optional<View> (image.view ());
 }
 
 template Result<std::optional<ImageView<const std::uint8_t>>>
-PartnerReader::read (GstBuffer *, int);
+PartnerReader::read (GstBuffer *, int, Image<float> *);
 template Result<std::optional<ImageView<const std::uint16_t>>>
-PartnerReader::read (GstBuffer *, int);
+PartnerReader::read (GstBuffer *, int, Image<float> *);
 
 } // namespace codedexposure::gst

@@ -24,10 +24,11 @@ public:
   /** Null: it sees one mirror with each pixel. */
   const Rectifier *rectifier () const { return rectifier_.get (); }
   /** The partner of @p coded, until the next call; none if it has none of use.
-   * @p bits: significant ones; 0: all. */
+   * @p bits: significant ones; 0: all. @p errors: see Rectifier::run (), if it
+   * is not null and there is a rectifier. */
   template <typename Pixel>
   Result<std::optional<ImageView<const Pixel>>> read (
-      GstBuffer *coded, int bits);
+      GstBuffer *coded, int bits, Image<float> *errors = nullptr);
   /** What read () has given, with a rectifier, for its correction. */
   template <typename Pixel>
   ImageView<Pixel> rectified ()
@@ -55,8 +56,8 @@ private:
 };
 
 extern template Result<std::optional<ImageView<const std::uint8_t>>>
-PartnerReader::read (GstBuffer *, int);
+PartnerReader::read (GstBuffer *, int, Image<float> *);
 extern template Result<std::optional<ImageView<const std::uint16_t>>>
-PartnerReader::read (GstBuffer *, int);
+PartnerReader::read (GstBuffer *, int, Image<float> *);
 
 } // namespace codedexposure::gst

@@ -204,26 +204,29 @@ template <typename Pixel>
 Result<guint64>
 Fuse::take_pixels (GstBuffer *buffer, MappedFrame &coded)
 {
+  /* Without a mapping, they stay empty. */
+  Image<float> errors, errors_of_other;
+  const bool wanted = find_pad (*pads (), PadKind::uncertainty) != nullptr;
   std::optional<ImageView<const Pixel>> other;
   if (plan_->partners) {
     ASSIGN_OR_RETURN (
-        other, plan_->partners->read<Pixel> (buffer, significant_bits ()));
+        other, plan_->partners->read<Pixel> (buffer, significant_bits (),
+                   wanted ? &errors_of_other : nullptr));
   }
   const auto view = view_of<const Pixel> (coded);
   const guint64 saturated = count_saturated (view, significant_bits ());
-  /* Without a mapping, it stays empty. */
-  Image<float> errors;
-  const bool wanted = find_pad (*pads (), PadKind::uncertainty) != nullptr;
   const auto rectified = rectify (view, wanted ? &errors : nullptr);
   if (!rectified)
     return rectified.error ();
+  const auto view_of_known = [] (Image<float> &image) {
+    return image.width () > 0 ? std::optional (image.view ()) : std::nullopt;
+  };
   if (other && plan_->correction)
     RETURN_IF_ERROR (std::get<PartnerCorrection<Pixel>> (*plan_->correction)
                          .run (*rectified, plan_->partners->rectified<Pixel> (),
-                             stop_token ()));
-  std::optional<ImageView<const float>> known;
-  if (errors.width () > 0)
-    known = std::as_const (errors).view ();
+                             view_of_known (errors_of_other), stop_token ()));
+  const CodedErrors known{
+      view_of_known (errors), view_of_known (errors_of_other)};
   if (const auto taken =
           std::get<Fuser<Pixel>> (plan_->fuser).take (*rectified, other, known);
       !taken)

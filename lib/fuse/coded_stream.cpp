@@ -67,7 +67,8 @@ CodedLight
 CodedCamera::room () const
 {
   const int width = pixels_.width (), height = pixels_.height ();
-  return {Field (width, height), SplitField (width, height, radius_, period_)};
+  return {
+      Field (width, height), SplitField (width, height, radius_, period_), {}};
 }
 
 void
@@ -105,7 +106,7 @@ CodedStream::next ()
       spare_.partner = partner_->room ();
   }
   spare_.has_partner = false;
-  spare_.errors = {};
+  spare_.errors = spare_.partner.errors = {};
   return spare_;
 }
 

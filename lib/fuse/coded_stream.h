@@ -18,15 +18,15 @@ namespace codedexposure::fuse
 struct CodedLight {
   Field light;
   SplitField pairs;
+  /** Squared errors of the light beyond the noise, grey levels, where they are
+   * known; empty: there are none. */
+  Field errors;
 };
 
 /** A coded frame and, if it has one, its partner. */
 struct CodedFrame : CodedLight {
   CodedLight partner;
   bool has_partner = false;
-  /** Squared errors of the light beyond the noise, grey levels, where they are
-   * known; empty: there are none. */
-  Field errors;
   /** 1 for each pixel near which the partner is not known, row by row without
    * padding; empty: it is everywhere. */
   std::vector<std::uint8_t> clipped;

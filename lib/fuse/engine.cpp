@@ -389,8 +389,8 @@ Engine::fuse_frame (const CodedFrames &frames, const RowSink &sink,
     uncertainty_.emplace (schedule_, *plan_, quality_, size_, depth_);
   const Field &misfit = motion_ ? misfit_ : seen->predicted.misfit;
   return uncertainty_->run (kernels_,
-      {frames.now->light, noise_, seen->still, misfit, light_,
-          refiner_ ? &deviations_ : nullptr, frames.now->errors},
+      {frames, partner_fit_ ? &*partner_fit_ : nullptr, noise_, seen->still,
+          misfit, light_, refiner_ ? &deviations_ : nullptr},
       deviations, workers, stop);
 }
 

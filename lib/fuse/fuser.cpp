@@ -160,7 +160,7 @@ struct Fuser<Pixel>::State {
 
   Result<void> take (ImageView<const Pixel> coded,
       const std::optional<ImageView<const Pixel>> &partner,
-      const std::optional<ImageView<const float>> &errors);
+      const CodedErrors &errors);
   fuse::LightRatio light_of (
       ImageView<const Pixel> coded, ImageView<const Pixel> partner) const;
   std::vector<std::uint8_t> clipped_near (const Piece &piece,
@@ -269,7 +269,7 @@ template <typename Pixel>
 Result<void>
 Fuser<Pixel>::State::take (ImageView<const Pixel> coded,
     const std::optional<ImageView<const Pixel>> &partner,
-    const std::optional<ImageView<const float>> &errors)
+    const CodedErrors &errors)
 {
   const float scale = kWhite / largest;
   const fuse::LightRatio ratio =
@@ -294,9 +294,12 @@ Fuser<Pixel>::State::take (ImageView<const Pixel> coded,
     if (both)
       set_light (frame.partner.light, *stream.partner_camera (),
           partner->block (x, y, width, height), partner_scale, partner_black);
-    if (errors)
+    if (errors.coded)
       frame.errors = squared_errors (
-          stream.camera (), errors->block (x, y, width, height), scale);
+          stream.camera (), errors.coded->block (x, y, width, height), scale);
+    if (both && errors.partner)
+      frame.partner.errors = squared_errors (*stream.partner_camera (),
+          errors.partner->block (x, y, width, height), partner_scale);
     frame.clipped = both ? clipped_near (piece, coded, *partner, frame)
                          : std::vector<std::uint8_t> ();
     if (saturated)
@@ -524,7 +527,7 @@ template <typename Pixel>
 Result<void>
 Fuser<Pixel>::take (ImageView<const Pixel> coded,
     const std::optional<ImageView<const Pixel>> &partner,
-    const std::optional<ImageView<const float>> &errors)
+    const CodedErrors &errors)
 {
   const Rect &whole = state_->pieces.front ().rect;
   RETURN_IF_ERROR (check_view (
@@ -534,9 +537,10 @@ Fuser<Pixel>::take (ImageView<const Pixel> coded,
   if (partner)
     RETURN_IF_ERROR (check_view (ViewBytes::of (*partner),
         "partner of the coded frame", whole.width, whole.height));
-  if (errors)
-    RETURN_IF_ERROR (check_view (ViewBytes::of (*errors),
-        "errors of the coded frame", whole.width, whole.height));
+  for (const auto &known : {errors.coded, errors.partner})
+    if (known)
+      RETURN_IF_ERROR (check_view (ViewBytes::of (*known),
+          "errors of the coded frame", whole.width, whole.height));
   return state_->or_forget (
       [&] { return state_->take (coded, partner, errors); });
 }

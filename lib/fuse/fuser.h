@@ -64,6 +64,12 @@ struct FuseOptions {
   std::string_view target = {};
 };
 
+/** Errors of the pixels of a coded frame and its partner beyond their noise,
+ * rms, DN, as of Rectifier::run (); they count in the uncertainty. */
+struct CodedErrors {
+  std::optional<ImageView<const float>> coded = {}, partner = {};
+};
+
 /** "fast", "balanced", "best" or "learned". */
 std::string_view quality_name (FuseQuality quality);
 
@@ -133,14 +139,13 @@ public:
    * @p partner  none, or the coded frame of the beam of mirrors that are off,
    *             which has seen every mirror where @p coded has it (the same
    *             size), and collected light in the slots in which it was off.
-   * @p errors   none, or those of @p coded beyond the noise, rms, DN, as of
-   *             Rectifier::run (); they count in the uncertainty.
+   * @p errors   of the size of @p coded.
    * Error when a view does not have the size of make (), or there is a partner
    * without FuseOptions::partner; the stream is unchanged then. After
    * ErrorCode::out_of_memory it is as after forget (). */
   Result<void> take (ImageView<const Pixel> coded,
       const std::optional<ImageView<const Pixel>> &partner = {},
-      const std::optional<ImageView<const float>> &errors = {});
+      const CodedErrors &errors = {});
   /** Queued coded frames. */
   int pending () const;
   /** Fuses the oldest pending frame with those before and after it.

@@ -17,6 +17,10 @@ namespace codedexposure
 namespace
 {
 
+/* Of the errors of a partner, after the correction: 0.3 to 0.5 on clips, the
+ * less the more of them there were. */
+constexpr float kLeft = 0.45f;
+
 /** Light of an element: `all` times the sum of all slots, and `more` times
  * that of some. */
 struct SlotSum {
@@ -131,11 +135,15 @@ try {
 template <typename Pixel>
 Result<void>
 PartnerCorrection<Pixel>::run (ImageView<const Pixel> coded,
-    ImageView<Pixel> partner, std::stop_token stop)
+    ImageView<Pixel> partner, const std::optional<ImageView<float>> &errors,
+    std::stop_token stop)
 {
   RETURN_IF_ERROR (state_->fuser.run (coded, std::move (stop)));
   state_->workers->run (
       state_->light.height (), [this] (int y, int) { state_->add_up (y); });
+  for (int y = 0; errors && y < errors->height; y++)
+    for (int x = 0; x < errors->width; x++)
+      errors->at (x, y) *= kLeft;
   return state_->rectifier.correct (partner,
       std::as_const (state_->light).view (), *state_->workers, state_->largest);
 }

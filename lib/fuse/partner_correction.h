@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <stop_token>
 
 #include "base/image.h"
@@ -39,9 +40,12 @@ public:
   PartnerCorrection &operator= (PartnerCorrection &&) noexcept;
   ~PartnerCorrection ();
 
-  /** Both with a pixel a mirror. Error as of Fuser; the pixels of the partner
-   * are undefined then. */
+  /** Both with a pixel a mirror.
+   * @p errors  none, or those of the partner, as of Rectifier::run (): less of
+   *            them is left.
+   * Error as of Fuser; the pixels of the partner are undefined then. */
   Result<void> run (ImageView<const Pixel> coded, ImageView<Pixel> partner,
+      const std::optional<ImageView<float>> &errors = {},
       std::stop_token stop = {});
 
 private:

@@ -79,6 +79,16 @@ PartnerFit::make (int y, const float *const *light, float *to) const
 }
 
 void
+PartnerFit::follow (int y, int slot, float *to) const
+{
+  const int row = y % steps_.height ();
+  const float *response = responses_[std::size_t (slot)].row (row);
+  const float *step = steps_.row (row);
+  for (int x = 0; x < steps_.width (); x++)
+    to[x] = response[x] * step[x];
+}
+
+void
 PartnerFit::run (const Kernels &kernels, int y, const float *partner,
     float *const *light, Room &room) const
 {

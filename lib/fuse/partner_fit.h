@@ -50,6 +50,10 @@ public:
   /** What @p light makes in row @p y of the partner. */
   void make (int y, const float *const *light, float *to) const;
 
+  /** By how much the light of @p slot follows that of the partner, of the
+   * pixels of row @p y. */
+  void follow (int y, int slot, float *to) const;
+
 private:
   NoiseMap noise_;
   std::vector<Field> responses_; ///< m_s, of a period of rows

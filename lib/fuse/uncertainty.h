@@ -2,13 +2,17 @@
 /* How far fused light can be from the truth, pixel by pixel. */
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <stop_token>
 #include <vector>
 
 #include "base/workers.h"
+#include "fuse/coded_stream.h"
 #include "fuse/fuser.h"
+#include "fuse/partner_fit.h"
 #include "fuse/phases.h"
 #include "fuse/static_pixels.h"
 
@@ -24,9 +28,10 @@ namespace codedexposure::fuse
  * their neighbours; D: mean squared difference of its slot from the coded frame
  * in 3x3 pixels, both less N; L: of its slot from the mean of the four
  * neighbours in 3x3 pixels; 1/4 is added to each. V: the kriging variance for
- * its position in the tile and its slot; N: the noise of a coded pixel. Units
- * are grey levels squared, 255 for white; V is relative to the scene's
- * variance. Errors of the coded pixel that are known beside its noise, as those
+ * its position in the tile and its slot, with a partner if there is one; N: the
+ * noise of a coded pixel. Units are grey levels squared, 255 for white; V is
+ * relative to the scene's variance. The factors of frames with a partner are
+ * others. Errors of the coded pixel that are known beside its noise, as those
  * of what was rectified, are added to d^2.
  */
 struct UncertaintyFactors {
@@ -44,7 +49,8 @@ public:
 
   /** A fused frame. */
   struct Frame {
-    const Field &coded;
+    const CodedFrames &frames;
+    const PartnerFit *partner_fit; ///< null if there are no partners
     const NoiseMap &noise;
     const StaticPixels::Found &still;
     const Field &misfit;             ///< A, of blocks of 2x2 pixels
@@ -52,13 +58,13 @@ public:
     /** Logarithms to base 2 of the deviations of pixels that are not static, by
      * slot, which the network that refined them said; or null. */
     const std::vector<Field> *refined;
-    const Field &errors; ///< see CodedFrame
   };
   /** What the deviation of a pixel is computed from: the logarithms to base 2
    * of A, D, L and V, and N. Measured pixels saw the slot, and no other one. */
   struct Pixel {
     float misfit, change, roughness, geometry, noise;
     bool measured;
+    bool both; ///< cameras tell of it
   };
   /** Deviations in grey levels, and what those of pixels that are not static
    * were computed from. Threads may call it for different slots at the same
@@ -82,6 +88,8 @@ private:
       const Frame &frame, int slot, int y, float *change, float *rough) const;
   void set_pixels (const Frame &frame, int slot, int y, const float *change,
       const float *rough, std::vector<Pixel> &pixels) const;
+  void add_known (const Frame &frame, int slot, int y,
+      std::span<const Pixel> pixels, float *squares) const;
   float deviation (const Pixel &pixel) const;
 
   const Phases &phases_;
@@ -90,7 +98,8 @@ private:
   bool noise_free_;
   float rounding_;                ///< variance
   FieldOf<std::int16_t> slot_of_; ///< of each pixel; -1: several
-  std::vector<float> geometry_;   ///< by phase and slot
+  /** By phase and slot: of one camera, and of both if there are partners. */
+  std::array<std::vector<float>, 2> geometry_;
 };
 
 } // namespace codedexposure::fuse

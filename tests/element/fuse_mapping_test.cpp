@@ -180,7 +180,7 @@ TEST_F (FuseMapping, UncertaintyHasTheErrorsOfRectification)
     ASSERT_TRUE (
         rectifier.run (seen.view (), mirrors.view (), 0, errors.view ()));
     ASSERT_TRUE (
-        fuser.take (mirrors.view (), {}, std::as_const (errors).view ()));
+        fuser.take (mirrors.view (), {}, {.coded = errors.view ()}));
     ASSERT_TRUE (fuser.fuse (views_of (fused), {}, views_of (deviations)));
     for (const auto &expected : deviations) {
       const BufferPtr buffer (gst_harness_try_pull (pad));

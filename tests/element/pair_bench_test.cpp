@@ -11,8 +11,11 @@
 
 #include "common/messages.h"
 #include "common/tag.h"
+#include "fuse/fuser.h"
+#include "fuse/partner_correction.h"
 #include "mapping_error.h"
 #include "pipeline.h"
+#include "rectify/rectifier.h"
 
 namespace
 {
@@ -281,23 +284,29 @@ bytes_of (Pipeline &pipeline, const std::string &path)
   return pixels;
 }
 
+constexpr const char *kLattice = "schedule=sequential:lattice:4/2 ";
+
+std::string
+sim_of_second (const Cameras &cameras)
+{
+  return "codedexposure-sim beam=off gain=0.8 shift-y=0.5 shift-x=" +
+         std::to_string (cameras.right) + " " + kLattice;
+}
+
 /** Pixels that @p element makes of them. */
 std::vector<std::uint8_t>
 made_by (const std::string &element, const Cameras &cameras = {})
 {
   const std::string path = ::testing::TempDir () + "pair-made.gray";
-  const std::string schedule = "schedule=sequential:lattice:4/2 ";
   const std::string second =
-      "light. ! queue ! codedexposure-sim beam=off gain=0.8 shift-y=0.5 "
-      "shift-x=" +
-      std::to_string (cameras.right) + " " + schedule +
-      "! identity name=off ! dmdsync name=sync beam=off " + schedule +
+      "light. ! queue ! " + sim_of_second (cameras) +
+      "! identity name=off ! dmdsync name=sync beam=off " + kLattice +
       "! pair.off ";
   Pipeline pipeline (
       kScene +
       ("! tee name=light light. ! queue ! codedexposure-sim " + cameras.first +
-          " " + schedule) +
-      "! dmdsync " + schedule +
+          " " + kLattice) +
+      "! dmdsync " + kLattice +
       (cameras.paired ? "! pair.on " + second + "codedexposure-pair name=pair"
                       : "") +
       " ! " + element + " ! filesink location=" + path);
@@ -345,6 +354,62 @@ TEST (PairBench, ASecondCameraBetweenTheMirrorsHelpsAsWell)
 {
   EXPECT_LT (error_of ("codedexposure-fuse", {}),
       0.85 * error_of ("codedexposure-fuse", {.paired = false}));
+}
+
+/* As the library has it, with the errors that resampling makes. */
+TEST (PairBench, TheUncertaintyHasTheErrorsOfASecondCamera)
+{
+  const auto [width, height] = kSize;
+  const auto bytes = made_by ("codedexposure-fuse name=fuse fuse. ! queue ! "
+                              "fakesink fuse.uncertainty ! queue");
+  auto first = made_by ("identity", {.paired = false});
+  const std::string path = ::testing::TempDir () + "pair-second.gray";
+  Pipeline beam (
+      kScene + ("! " + sim_of_second ({}) + "! filesink location=") + path);
+  auto second = bytes_of (beam, path);
+  const std::size_t size = std::size_t (width * height);
+  ASSERT_EQ (bytes.size (), 2 * 16 * size);
+  ASSERT_EQ (first.size (), 4 * size);
+  ASSERT_EQ (second.size (), first.size ());
+
+  const auto schedule =
+      Schedule::from_preset ("sequential:lattice:4/2").value ();
+  FuseOptions options;
+  options.partner = true;
+  options.partner_noise.emplace ();
+  const auto profile = BenchProfile::from_json (bench_of_second ({})).value ();
+  const Rectifier rectifier = Rectifier::make (*profile.second.front ().mapping,
+      *schedule.complement (), {.keep_unknown = true, .correct = true})
+                                  .value ();
+  auto correction =
+      PartnerCorrection<std::uint8_t>::make (schedule, rectifier, options)
+          .value ();
+  auto fuser =
+      Fuser<std::uint8_t>::make (schedule, width, height, options).value ();
+  std::vector<Image<std::uint8_t>> fused (
+      4, Image<std::uint8_t> (width, height));
+  std::vector<Image<std::uint16_t>> deviations (
+      4, Image<std::uint16_t> (width, height));
+  Image<std::uint8_t> partner (width, height);
+  Image<float> errors (width, height);
+  std::vector<std::uint16_t> expected;
+  for (std::size_t at = 0; at < first.size (); at += size) {
+    const ImageView<const std::uint8_t> coded{
+        first.data () + at, width, height, width};
+    const ImageView<const std::uint8_t> other{
+        second.data () + at, width, height, width};
+    ASSERT_TRUE (rectifier.run (other, partner.view (), 0, errors.view ()));
+    ASSERT_TRUE (correction.run (coded, partner.view (), errors.view ()));
+    ASSERT_TRUE (fuser.take (
+        coded, std::as_const (partner).view (), {.partner = errors.view ()}));
+    ASSERT_TRUE (fuser.fuse (views_of (fused), {}, views_of (deviations)));
+    for (const auto &image : deviations)
+      for (int y = 0; y < height; y++)
+        expected.insert (expected.end (), image.view ().row (y),
+            image.view ().row (y) + width);
+  }
+  for (std::size_t i = 0; i < expected.size (); i++)
+    ASSERT_EQ (bytes[2 * i] + 256 * bytes[2 * i + 1], expected[i]) << i;
 }
 
 /* Half of the first camera's range is white of the scene. */

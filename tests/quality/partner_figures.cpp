@@ -49,17 +49,30 @@ mean_gain (const std::vector<Scene> &scenes, int n, FuseQuality quality,
   return mean;
 }
 
-/* White is not saturated. */
+} // namespace
+
 Condition
 second_camera (const Condition &first, int slots)
 {
-  constexpr double kWhite = 0.95; // of the largest value
   Condition second = first.of_partner ();
-  second.gain = kWhite * slots / (slots - 1);
+  second.gain = kWhiteOfSecond * slots / (slots - 1);
   return second;
 }
 
-} // namespace
+Condition
+of_own_view (Condition second, double stretch, double keystone)
+{
+  second.view = View{.mirrored = true,
+      .shift_x = 0.3,
+      .shift_y = 0.4,
+      .rotation = 0.5,
+      .scale = 1.01,
+      .stretch = stretch,
+      .keystone = keystone};
+  second.blur = 0.3;
+  second.mapped = true;
+  return second;
+}
 
 BeamGain
 beam_gain (const Scene &scene, int n, FuseQuality quality,
@@ -196,25 +209,14 @@ Table
 partner_view_table (const std::vector<Scene> &scenes, const Progress &progress)
 {
   using C = Condition;
-  static constexpr auto see = [] (C &p, double stretch, double keystone) {
-    p.view = View{.mirrored = true,
-        .shift_x = 0.3,
-        .shift_y = 0.4,
-        .rotation = 0.5,
-        .scale = 1.01,
-        .stretch = stretch,
-        .keystone = keystone};
-    p.blur = 0.3;
-    p.mapped = true;
-  };
   const Change views[] = {
       {"as the first camera, no blur", [] (C &, C &, int) {}},
       {"mirror image, 0.5 degrees, 1 %, shift (0.3, 0.4), blur of 0.3 px",
-          [] (C &, C &p, int) { see (p, 1.0, 0.0); }},
+          [] (C &, C &p, int) { p = of_own_view (p); }},
       {"the same, seen at 24 degrees",
-          [] (C &, C &p, int) { see (p, 1.05, 0.011); }},
+          [] (C &, C &p, int) { p = of_own_view (p, 1.05, 0.011); }},
       {"seen at 48 degrees, pixels of 1.5 x 1 mirrors",
-          [] (C &, C &p, int) { see (p, 1.5, 0.022); }},
+          [] (C &, C &p, int) { p = of_own_view (p, 1.5, 0.022); }},
   };
   Table table{"partner-views",
       "PSNR (dB) of fast with a second camera of its own view, which its "

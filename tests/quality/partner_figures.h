@@ -11,6 +11,18 @@
 namespace codedexposure::quality
 {
 
+/** Of the largest value of a second camera, which white does not saturate. */
+constexpr double kWhiteOfSecond = 0.95;
+
+/** Beside @p first. */
+Condition second_camera (const Condition &first, int slots);
+
+/** With its own view, which its mapping has: a mirror image, turned by half a
+ * degree, 1 % larger and shifted by (0.3, 0.4) px, behind a lens that blurs by
+ * 0.3 px; by default seen from the front. */
+Condition of_own_view (
+    Condition second, double stretch = 1.0, double keystone = 0.0);
+
 /** Mean PSNR over the frames of coded frames, without a border of 8 px, with
  * one camera and with a second one in the other beam. */
 struct BeamGain {

@@ -240,7 +240,7 @@ corrected (
 void
 correct_partners (std::vector<Picture> &partners,
     const std::vector<Picture> &coded, const Schedule &schedule,
-    const Condition &condition)
+    const Condition &condition, std::vector<Image<float>> *errors)
 {
   const Extent size{coded.front ().width (), coded.front ().height ()};
   const Rectifier rectifier =
@@ -251,13 +251,18 @@ correct_partners (std::vector<Picture> &partners,
   options.noise = {condition.electrons, condition.read_noise};
   auto correction = must (
       PartnerCorrection<std::uint8_t>::make (schedule, rectifier, options));
-  for (std::size_t i = 0; i < partners.size (); i++)
-    must (
-        correction.run (std::as_const (coded[i]).view (), partners[i].view ()));
+  for (std::size_t i = 0; i < partners.size (); i++) {
+    std::optional<ImageView<float>> known;
+    if (errors)
+      known = (*errors)[i].view ();
+    must (correction.run (
+        std::as_const (coded[i]).view (), partners[i].view (), known));
+  }
 }
 
 std::vector<Picture>
-take (const Scene &scene, const Schedule &schedule, const Condition &condition)
+take (const Scene &scene, const Schedule &schedule, const Condition &condition,
+    std::vector<Image<float>> *errors)
 {
   const int width = scene.frames.front ().width ();
   const int height = scene.frames.front ().height ();
@@ -272,8 +277,12 @@ take (const Scene &scene, const Schedule &schedule, const Condition &condition)
       bench.expose (std::as_const (scene.frames[at + s]).view (), int (s), 1.0);
     Picture &frame = coded.emplace_back (width, height);
     bench.read_out (coded.size () - 1, frame.view ());
-    if (condition.mapped)
-      frame = corrected (frame, schedule, condition).frame;
+    if (!condition.mapped)
+      continue;
+    Corrected seen = corrected (frame, schedule, condition);
+    frame = std::move (seen.frame);
+    if (errors)
+      errors->push_back (std::move (seen.errors));
   }
   return coded;
 }

@@ -92,9 +92,11 @@ struct Score {
 };
 
 /** The coded frames of a scene, n slots each; slots left over at the end make
- * none. Noise depends on the number of the frame only. */
-std::vector<Picture> take (
-    const Scene &scene, const Schedule &schedule, const Condition &condition);
+ * none. Noise depends on the number of the frame only.
+ * @p errors  get those of each frame, if they are not null and there is a
+ *            mapping. */
+std::vector<Picture> take (const Scene &scene, const Schedule &schedule,
+    const Condition &condition, std::vector<Image<float>> *errors = nullptr);
 
 /** A coded frame of a camera that has a mapping. */
 struct Corrected {
@@ -107,10 +109,10 @@ Corrected corrected (
 /** Corrects the frames of a second camera that has a mapping, which take () has
  * made under @p condition, by what the first one tells.
  * @p schedule  of the first camera, whose @p coded frames they are partners of.
- */
+ * @p errors    of take (), or null. */
 void correct_partners (std::vector<Picture> &partners,
     const std::vector<Picture> &coded, const Schedule &schedule,
-    const Condition &condition);
+    const Condition &condition, std::vector<Image<float>> *errors = nullptr);
 
 /** The subframes of one coded frame, as they are, before any Reading. */
 std::vector<Picture> split (const Picture &coded, const Way &way);

@@ -40,11 +40,10 @@ struct Result {
   std::vector<Image<std::uint16_t>> deviations;
 };
 
-/* Of the last coded frame. */
+/* Of the last coded frame. A partner sees what it does. */
 Result
 fuse (const Schedule &schedule, const FuseOptions &options, int noise,
-    bool deviations = true,
-    const std::optional<ImageView<const float>> &errors = {})
+    bool deviations = true, const CodedErrors &errors = {})
 {
   auto fuser =
       Fuser<std::uint8_t>::make (schedule, kWidth, kHeight, options).value ();
@@ -60,7 +59,10 @@ fuse (const Schedule &schedule, const FuseOptions &options, int noise,
   for (auto &image : result.deviations)
     deviation_views.push_back (image.view ());
   for (const auto &frame : coded_frames (noise)) {
-    EXPECT_TRUE (fuser.take (frame.view (), {}, errors));
+    std::optional<ImageView<const std::uint8_t>> partner;
+    if (options.partner)
+      partner = frame.view ();
+    EXPECT_TRUE (fuser.take (frame.view (), partner, errors));
     EXPECT_TRUE (fuser.fuse (views, {}, deviation_views));
   }
   return result;
@@ -143,8 +145,7 @@ TEST (Uncertainty, KnownErrorsOfACodedFrameAreAdded)
     for (int x = 0; x < kWidth; x++)
       errors.at (x, y) = float (x % 5) / 2;
   const Result without = fuse (schedule, {}, 3);
-  const Result with =
-      fuse (schedule, {}, 3, true, std::as_const (errors).view ());
+  const Result with = fuse (schedule, {}, 3, true, {.coded = errors.view ()});
   EXPECT_EQ (with.fused, without.fused);
   for (std::size_t s = 0; s < 4; s++)
     for (int y = 0; y < kHeight; y++)
@@ -157,11 +158,37 @@ TEST (Uncertainty, KnownErrorsOfACodedFrameAreAdded)
       Fuser<std::uint8_t>::make (schedule, kWidth, kHeight, {}).value ();
   const Image<float> small (kWidth, kHeight - 1);
   const auto refused =
-      fuser.take (coded_frames (0)[0].view (), {}, small.view ());
+      fuser.take (coded_frames (0)[0].view (), {}, {.coded = small.view ()});
   ASSERT_FALSE (refused);
   EXPECT_NE (refused.error ().message.find ("errors of the coded frame"),
       std::string::npos)
       << refused.error ().message;
+}
+
+/* In every slot in which the mirror was off; what the first camera measured
+ * does not follow the second one. */
+TEST (Uncertainty, KnownErrorsOfAPartnerAreAdded)
+{
+  const Schedule schedule = test::schedule_of ("sequential:2x2");
+  FuseOptions options;
+  options.partner = true;
+  Image<float> errors (kWidth, kHeight);
+  for (int y = 0; y < kHeight; y++)
+    for (int x = 0; x < kWidth; x++)
+      errors.at (x, y) = float (x % 5) / 2;
+  const Result without = fuse (schedule, options, 3);
+  const Result with =
+      fuse (schedule, options, 3, true, {.partner = errors.view ()});
+  EXPECT_EQ (with.fused, without.fused);
+  for (int s = 0; s < 4; s++)
+    for (int y = 0; y < kHeight; y++)
+      for (int x = 28; x < kWidth; x++) {
+        const bool measured = s == x % 2 + 2 * (y % 2);
+        const double before = without.deviations[std::size_t (s)].at (x, y);
+        ASSERT_NEAR (with.deviations[std::size_t (s)].at (x, y),
+            std::hypot (before, measured ? 0.0 : 256 * errors.at (x, y)), 1.0)
+            << s << ' ' << x << ' ' << y;
+      }
 }
 
 TEST (Uncertainty, EachSlotOfARegionHasItsOwn)

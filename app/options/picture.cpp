@@ -40,8 +40,8 @@ DecodeOptions::declare (Options &options)
   options.value ("--overlap", overlap, "N",
       "after --fuse: exposures that are fused for each coded frame; beyond 1, "
       "those between two frames make the first and last slots as true as the "
-      "others, in N times the time [1]",
-      whole (1, 4));
+      "others, in N times the time; as many as there are slots at most [1]",
+      whole (1, 8));
   options.value ("--bench", bench, "FILE",
       "bench profile (JSON) with noise, black level, leakage and mapping; "
       "other options win [that of the recording]");

@@ -58,7 +58,8 @@ Fuse::properties ()
           "Exposures that are fused for each coded frame: beyond 1, also those "
           "that begin in it and end in the next one, which makes the first and "
           "last slots of a frame as true as the others, in as many times the "
-          "time; needs lookahead=1; for one-hot codes and frames with hardly a "
+          "time; as many as there are slots at most; needs lookahead=1; for "
+          "one-hot codes and frames with hardly a "
           "gap, others stay as they are, with a warning",
           kReadWrite, &FuseOptions::overlap, 1u,
           guint (Fuser<std::uint8_t>::kMaxOverlap)},
@@ -117,7 +118,8 @@ Fuse::method_name () const
   if (plan_ && plan_->partners)
     name += ", both beams";
   if (in_force_.overlap > 1 && unoverlapped ().empty ())
-    name += ", overlap " + std::to_string (in_force_.overlap);
+    name += ", overlap " + std::to_string (std::min (
+                               in_force_.overlap, format ().schedule.slots ()));
   if (in_force_.range > 1)
     name += ", range " + std::to_string (in_force_.range);
   if ((learned || in_force_.refine) && unrefined ().empty ())

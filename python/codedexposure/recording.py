@@ -106,7 +106,7 @@ class Recording:
         range       of both cameras: white of the frames in whites of the first
                     one, whose saturated pixels are seen by the second behind a
                     filter
-        overlap     exposures that are fused for each coded frame, 1 to 4; beyond
+        overlap     exposures that are fused for each coded frame, 1 to 8; beyond
                     1, those between two frames make the first and last slots
                     as true as the others, in as many times the time
         The rest is as for subframes ().

@@ -127,7 +127,7 @@ sequence_ways (int n)
   all.push_back (fusion_way (n, FuseQuality::kLearned, false, 1));
   all.push_back (overlap_way (n, FuseQuality::kBalanced, false, 2));
   all.push_back (overlap_way (n, FuseQuality::kBalanced, true, 2));
-  for (const int overlap : {2, 4})
+  for (int overlap = 2; overlap <= n; overlap *= 2)
     all.push_back (overlap_way (n, FuseQuality::kLearned, false, overlap));
   return all;
 }

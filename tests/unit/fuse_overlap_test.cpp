@@ -216,12 +216,12 @@ TEST (FuseOverlap, SaysWhyThereIsNone)
   ASSERT_FALSE (refused);
   EXPECT_NE (
       refused.error ().message.find ("set lookahead to 1"), std::string::npos);
-  live.overlap = 5;
+  live.overlap = 9;
   EXPECT_EQ (
       Fuser<std::uint8_t>::make (schedule_of ("sequential:2x2"), 8, 8, live)
           .error ()
           .message,
-      "overlap 5: 1 to 4 exposures are fused for each coded frame");
+      "overlap 9: 1 to 8 exposures are fused for each coded frame");
 }
 
 TEST (FuseOverlap, BeginsAnewAfterAStop)

@@ -2,23 +2,46 @@
 #include "extract/black_level.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "base/pixels.h"
 
 namespace codedexposure
 {
 
+namespace
+{
+
+/* Of one type and of a known number, compilers make vectors of them. */
+template <typename Pixel>
+void
+subtract (const Pixel *from, Pixel black, Pixel largest, int count, Pixel *to)
+{
+  for (int x = 0; x < count; x++) {
+    const auto less = Pixel (std::max (from[x], black) - black);
+    to[x] = from[x] >= largest ? from[x] : less;
+  }
+}
+
+} // namespace
+
 template <typename Pixel>
 void
 subtract_black (
     ImageView<const Pixel> frame, int black, int bits, ImageView<Pixel> light)
 {
-  const int largest = largest_pixel_of<Pixel> (bits);
-  for (int y = 0; y < frame.height; y++)
-    std::transform (frame.row (y), frame.row (y) + frame.width, light.row (y),
-        [=] (Pixel value) {
-          return value >= largest ? value : Pixel (std::max (value - black, 0));
-        });
+  constexpr int kBlock = 64;
+  const auto largest = largest_pixel_of<Pixel> (bits);
+  const auto least =
+      Pixel (std::min (black, int (std::numeric_limits<Pixel>::max ())));
+  for (int y = 0; y < frame.height; y++) {
+    const Pixel *from = frame.row (y);
+    Pixel *to = light.row (y);
+    int x = 0;
+    for (; x + kBlock <= frame.width; x += kBlock)
+      subtract (from + x, least, largest, kBlock, to + x);
+    subtract (from + x, least, largest, frame.width - x, to + x);
+  }
 }
 
 template void subtract_black (

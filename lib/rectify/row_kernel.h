@@ -65,12 +65,6 @@ load_eight (const std::uint8_t *from)
 
 #endif
 
-CODEDEXPOSURE_INLINE float
-sum_of (Four v)
-{
-  return (v[0] + v[1]) + (v[2] + v[3]);
-}
-
 template <int First>
 CODEDEXPOSURE_INLINE Four
 four_of (Eight v)
@@ -78,59 +72,183 @@ four_of (Eight v)
   return __builtin_shufflevector (v, v, First, First + 1, First + 2, First + 3);
 }
 
-/** kTaps x kTaps pixels, row by row. */
-template <int kTaps>
-struct Window {
-  Eight rows[kTaps];
-  Four rest[kTaps]; ///< of each row, beyond eight
+/** Differences along each side of a window that say how rough it is. */
+constexpr int kSteps = 4;
 
-  template <typename Pixel>
-  CODEDEXPOSURE_INLINE void read (const Pixel *from, std::ptrdiff_t stride)
+/** Where the first pixel of a window is, and the next row, in bytes. */
+template <typename Pixel>
+struct Corner {
+  const Pixel *first;
+  std::ptrdiff_t stride;
+
+  CODEDEXPOSURE_INLINE const Pixel *row (int y) const
   {
-    for (int y = 0; y < kTaps; y++) {
-      rows[y] = load_eight (from);
-      if constexpr (kTaps > 8)
-        rest[y] = four_of<0> (load_eight (from + 8));
-      from = reinterpret_cast<const Pixel *> (
-          reinterpret_cast<const char *> (from) + stride);
-    }
+    return reinterpret_cast<const Pixel *> (
+        reinterpret_cast<const char *> (first) + y * stride);
   }
+};
 
-  /** Mean squared difference of neighbours among the central 5 x 5 pixels. */
-  CODEDEXPOSURE_INLINE float roughness () const
+/** kTaps x kTaps pixels. */
+template <int kTaps, typename Pixel>
+struct Window {
+  Corner<Pixel> at;
+
+  /** Four parts of the sum of squared differences of neighbours among the
+   * central 5 x 5 pixels. */
+  CODEDEXPOSURE_INLINE Four roughness () const
   {
-    constexpr int kFirst = kTaps / 2 - 2, kSteps = 4;
-    Four across = {}, down = {};
+    constexpr int kFirst = kTaps / 2 - 2;
+    Eight across = {}, down = {}, here = load_eight (at.row (kFirst));
     for (int y = kFirst; y < kFirst + kSteps; y++) {
-      const Four here = four_of<kFirst> (rows[y]);
-      const Four below = four_of<kFirst> (rows[y + 1]);
-      const Four right = four_of<kFirst + 1> (rows[y]);
+      const Eight below = load_eight (at.row (y + 1));
+      const Eight right =
+          __builtin_shufflevector (here, here, 1, 2, 3, 4, 5, 6, 7, 7);
       across += (right - here) * (right - here);
       down += (below - here) * (below - here);
+      here = below;
     }
-    return sum_of (across + down) / (2 * kSteps * kSteps);
+    return four_of<kFirst> (across + down);
   }
 
-  /** @p weights: see Filters. */
-  CODEDEXPOSURE_INLINE float filtered (const float *weights) const
+  /** Four parts of the sum. @p weights: see Filters. */
+  CODEDEXPOSURE_INLINE Four filtered (const float *weights) const
   {
     Eight sum = {};
     Four beyond = {};
     for (int y = 0; y < kTaps; y++, weights += rectify::row_length (kTaps)) {
       Eight w;
       __builtin_memcpy (&w, weights, sizeof w);
-      sum += w * rows[y];
+      sum += w * load_eight (at.row (y));
       if constexpr (kTaps > 8) {
         Four v;
         __builtin_memcpy (&v, weights + 8, sizeof v);
-        beyond += v * rest[y];
+        beyond += v * four_of<0> (load_eight (at.row (y) + 8));
       }
     }
     Four half = four_of<0> (sum) + four_of<4> (sum);
     if constexpr (kTaps > 8)
       half += beyond;
-    return sum_of (half);
+    return half;
   }
+};
+
+/** Windows of a row of mirrors. */
+template <int kTaps, typename Pixel>
+class Windows
+{
+public:
+  CODEDEXPOSURE_INLINE explicit Windows (const rectify::Source<Pixel> &from)
+      : from_ (from)
+  {
+  }
+  CODEDEXPOSURE_INLINE Corner<Pixel> corner (const rectify::Place &place) const
+  {
+    const auto *row =
+        reinterpret_cast<const char *> (from_.first) + place.y * from_.stride;
+    return {reinterpret_cast<const Pixel *> (row) + place.x, from_.stride};
+  }
+  /** Valid until the next call. */
+  CODEDEXPOSURE_INLINE Window<kTaps, Pixel> of (const rectify::Place &place)
+  {
+    const Corner<Pixel> at = corner (place);
+    if (place.x + rectify::kRead <= from_.width)
+      return {at};
+    for (int y = 0; y < kTaps; y++)
+      __builtin_memcpy (
+          copy_ + y * rectify::kRead, at.row (y), kTaps * sizeof (Pixel));
+    return {{copy_, std::ptrdiff_t (rectify::kRead * sizeof (Pixel))}};
+  }
+
+private:
+  const rectify::Source<Pixel> &from_;
+  Pixel copy_[kTaps * rectify::kRead] = {};
+};
+
+/** Some mirrors of a row, each step for all of them: what one waits for is
+ * computed for others. */
+template <int kTaps, typename Pixel>
+class Mirrors
+{
+public:
+  static constexpr int kMost = 64;
+
+  CODEDEXPOSURE_INLINE
+  Mirrors (const rectify::Source<Pixel> &from, const rectify::Filters &filters)
+      : filters_ (filters), windows_ (from)
+  {
+  }
+
+  /** Differences beyond the noise are the scene's. */
+  CODEDEXPOSURE_INLINE void choose (const rectify::Place *places, int count)
+  {
+    for (int x = 0; x < count; x++) {
+      chosen_[x] = places[x].filter * rectify::kNoises;
+      const bool sought = places[x].filter >= 0 && filters_.scales;
+      scales_[x] =
+          sought ? filters_.scales[places[x].filter] : rectify::WindowScale{};
+      parts_[x] = sought ? windows_.of (places[x]).roughness () : Four{};
+    }
+    constexpr int kDifferences = 2 * kSteps * kSteps;
+    const float to_noise = 0.5f / filters_.noise;
+    for (int x = 0; x < count && filters_.scales; x++) {
+      const float rough = sum_of (x) / kDifferences;
+      scene_[x] = (rough * to_noise * scales_[x].darkness - 1.0f) *
+                  scales_[x].smoothness;
+    }
+    for (const float limit : filters_.limits)
+      for (int x = 0; x < count && filters_.scales; x++)
+        chosen_[x] += scene_[x] <= limit;
+  }
+
+  CODEDEXPOSURE_INLINE void filter (
+      const rectify::Place *places, int count, Pixel *to)
+  {
+    for (int x = 0; x < count; x++)
+      parts_[x] =
+          places[x].filter < 0
+              ? Four{}
+              : windows_.of (places[x]).filtered (
+                    filters_.weights + std::ptrdiff_t (chosen_[x]) * kTaps *
+                                           rectify::row_length (kTaps));
+    const float largest = filters_.largest;
+    for (int x = 0; x < count; x++) {
+      const float rounded = sum_of (x) + 0.5f;
+      to[x] = Pixel (std::int32_t (rounded < 0.0f      ? 0.0f
+                                   : rounded > largest ? largest
+                                                       : rounded));
+    }
+    for (int x = 0; x < count; x++)
+      if (places[x].filter == rectify::Place::kLookup)
+        to[x] = *windows_.corner (places[x]).first;
+  }
+
+  CODEDEXPOSURE_INLINE void find_errors (
+      const rectify::Place *places, int count, float *to) const
+  {
+    for (int x = 0; x < count; x++) {
+      to[x] = 0.0f;
+      if (places[x].filter < 0)
+        continue;
+      const rectify::FilterError &error = filters_.errors[chosen_[x]];
+      const float scene = scene_[x] > 0.0f ? scene_[x] : 0.0f;
+      to[x] = __builtin_sqrtf (
+          filters_.noise * (scene * error.scene + error.noise));
+    }
+  }
+
+private:
+  CODEDEXPOSURE_INLINE float sum_of (int x) const
+  {
+    const Four &v = parts_[x];
+    return (v[0] + v[1]) + (v[2] + v[3]);
+  }
+
+  const rectify::Filters &filters_;
+  Windows<kTaps, Pixel> windows_;
+  Four parts_[kMost];
+  rectify::WindowScale scales_[kMost];
+  float scene_[kMost] = {};
+  std::int32_t chosen_[kMost];
 };
 
 /** RectifyRow. */
@@ -139,54 +257,14 @@ void
 rectify_row (const rectify::Source<Pixel> &from, const rectify::Place *places,
     int count, const rectify::Filters &filters, Pixel *to, float *errors)
 {
-  using rectify::kNoises, rectify::kRead;
-  const float to_noise = 0.5f / filters.noise;
-  Pixel copy[kTaps * kRead] = {};
-  for (int x = 0; x < count; x++) {
-    const rectify::Place &place = places[x];
-    const Pixel *first = reinterpret_cast<const Pixel *> (
-                             reinterpret_cast<const char *> (from.first) +
-                             place.y * from.stride) +
-                         place.x;
-    if (place.filter < 0) {
-      to[x] = place.filter == rectify::Place::kLookup ? *first : Pixel (0);
-      if (errors)
-        errors[x] = 0.0f;
-      continue;
-    }
-    std::ptrdiff_t stride = from.stride;
-    if (place.x + kRead > from.width) {
-      for (int y = 0; y < kTaps; y++)
-        __builtin_memcpy (copy + y * kRead,
-            reinterpret_cast<const char *> (first) + y * stride,
-            kTaps * sizeof (Pixel));
-      first = copy;
-      stride = std::ptrdiff_t (kRead * sizeof (Pixel));
-    }
-    Window<kTaps> window;
-    window.read (first, stride);
-    /* Differences beyond the noise are the scene's. */
-    float scene = 0.0f;
-    std::ptrdiff_t filter = std::ptrdiff_t (place.filter) * kNoises;
-    if (filters.scales) {
-      const rectify::WindowScale &scale = filters.scales[place.filter];
-      scene = (window.roughness () * to_noise * scale.darkness - 1.0f) *
-              scale.smoothness;
-      for (const float limit : filters.limits)
-        filter += scene <= limit;
-    }
-    const float sum = window.filtered (
-        filters.weights + filter * kTaps * rectify::row_length (kTaps));
-    const float rounded = sum + 0.5f;
-    to[x] = Pixel (std::int32_t (rounded < 0.0f              ? 0.0f
-                                 : rounded > filters.largest ? filters.largest
-                                                             : rounded));
-    if (errors) {
-      const rectify::FilterError &error = filters.errors[filter];
-      errors[x] = __builtin_sqrtf (
-          filters.noise *
-          ((scene > 0.0f ? scene : 0.0f) * error.scene + error.noise));
-    }
+  using Some = Mirrors<kTaps, Pixel>;
+  Some mirrors (from, filters);
+  for (int x = 0; x < count; x += Some::kMost) {
+    const int some = count - x < Some::kMost ? count - x : Some::kMost;
+    mirrors.choose (places + x, some);
+    mirrors.filter (places + x, some, to + x);
+    if (errors)
+      mirrors.find_errors (places + x, some, errors + x);
   }
 }
 

@@ -191,6 +191,8 @@ protected:
    */
   virtual int pictures_a_frame (const GstCodedPad *pad) const = 0;
   virtual RectifyOptions rectify_options (const Schedule &) const { return {}; }
+  /** That rectify frames; 0: one for each processor. */
+  virtual int threads () const { return 0; }
   /** How pictures are made, for their provenance: "select". */
   virtual std::string method_name () const = 0;
 
@@ -252,6 +254,8 @@ protected:
   template <typename Pixel>
   Result<ImageView<const Pixel>> rectify (
       ImageView<const Pixel> coded, Image<float> *errors = nullptr);
+  /** Threads that rectify frames, after the first one that is rectified. */
+  Workers &rectifying ();
   /** Whether the segment contains the time from @p pts for @p duration. */
   bool is_within (GstClockTime pts, GstClockTime duration) const;
   /** Posts a message when a sequence of saturated frames begins, and when there
@@ -373,6 +377,7 @@ private:
     std::optional<RectifierCache> rectifiers;
     Scratch light; ///< a frame without its black level
     Scratch rectified;
+    std::unique_ptr<Workers> rectifying; ///< made when they are first needed
   };
 
   /* Pads. */

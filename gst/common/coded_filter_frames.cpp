@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <thread>
 #include <utility>
 
 #include "base/pixels.h"
@@ -434,6 +435,20 @@ CodedFilter::Scratch::of (Extent size)
   return image;
 }
 
+Workers &
+CodedFilter::rectifying ()
+{
+  constexpr int kRowsOfAThread = 64;
+  if (!stream_.rectifying) {
+    const int most = std::clamp (format ().size.height / kRowsOfAThread, 1,
+        std::max (int (std::thread::hardware_concurrency ()), 1));
+    const int wanted = threads ();
+    stream_.rectifying =
+        std::make_unique<Workers> (wanted > 0 ? std::min (wanted, most) : most);
+  }
+  return *stream_.rectifying;
+}
+
 template <typename Pixel>
 Result<ImageView<const Pixel>>
 CodedFilter::rectify (ImageView<const Pixel> coded, Image<float> *errors)
@@ -455,7 +470,7 @@ CodedFilter::rectify (ImageView<const Pixel> coded, Image<float> *errors)
     wanted = errors->view ();
   }
   if (const auto done = rectifier->run (coded, rectified.view (),
-          bits > 0 ? largest_pixel (bits) : 0, wanted);
+          bits > 0 ? largest_pixel (bits) : 0, wanted, &rectifying ());
       !done)
     return done.error ();
   return ImageView<const Pixel> (rectified.view ());

@@ -33,7 +33,8 @@ PartnerReader::make (const PartnerSetup &partner, const CodedFormat &format,
 
 template <typename Pixel>
 Result<std::optional<ImageView<const Pixel>>>
-PartnerReader::read (GstBuffer *coded, int bits, Image<float> *errors)
+PartnerReader::read (
+    GstBuffer *coded, int bits, Workers *workers, Image<float> *errors)
 {
   using View = ImageView<const Pixel>;
   mapped_.reset ();
@@ -60,14 +61,14 @@ PartnerReader::read (GstBuffer *coded, int bits, Image<float> *errors)
     *errors = Image<float> (width, height);
     wanted = errors->view ();
   }
-  RETURN_IF_ERROR (rectifier_->run (
-      seen, image.view (), bits > 0 ? largest_pixel (bits) : 0, wanted));
+  RETURN_IF_ERROR (rectifier_->run (seen, image.view (),
+      bits > 0 ? largest_pixel (bits) : 0, wanted, workers));
   return std::optional<View> (image.view ());
 }
 
 template Result<std::optional<ImageView<const std::uint8_t>>>
-PartnerReader::read (GstBuffer *, int, Image<float> *);
+PartnerReader::read (GstBuffer *, int, Workers *, Image<float> *);
 template Result<std::optional<ImageView<const std::uint16_t>>>
-PartnerReader::read (GstBuffer *, int, Image<float> *);
+PartnerReader::read (GstBuffer *, int, Workers *, Image<float> *);
 
 } // namespace codedexposure::gst

@@ -24,11 +24,11 @@ public:
   /** Null: it sees one mirror with each pixel. */
   const Rectifier *rectifier () const { return rectifier_.get (); }
   /** The partner of @p coded, until the next call; none if it has none of use.
-   * @p bits: significant ones; 0: all. @p errors: see Rectifier::run (), if it
-   * is not null and there is a rectifier. */
+   * @p bits: significant ones; 0: all. @p workers and @p errors: see
+   * Rectifier::run (), if there is a rectifier; or null. */
   template <typename Pixel>
-  Result<std::optional<ImageView<const Pixel>>> read (
-      GstBuffer *coded, int bits, Image<float> *errors = nullptr);
+  Result<std::optional<ImageView<const Pixel>>> read (GstBuffer *coded,
+      int bits, Workers *workers = nullptr, Image<float> *errors = nullptr);
   /** What read () has given, with a rectifier, for its correction. */
   template <typename Pixel>
   ImageView<Pixel> rectified ()
@@ -56,8 +56,8 @@ private:
 };
 
 extern template Result<std::optional<ImageView<const std::uint8_t>>>
-PartnerReader::read (GstBuffer *, int, Image<float> *);
+PartnerReader::read (GstBuffer *, int, Workers *, Image<float> *);
 extern template Result<std::optional<ImageView<const std::uint16_t>>>
-PartnerReader::read (GstBuffer *, int, Image<float> *);
+PartnerReader::read (GstBuffer *, int, Workers *, Image<float> *);
 
 } // namespace codedexposure::gst

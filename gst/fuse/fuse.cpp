@@ -211,6 +211,7 @@ Fuse::take_pixels (GstBuffer *buffer, MappedFrame &coded)
   if (plan_->partners) {
     ASSIGN_OR_RETURN (
         other, plan_->partners->read<Pixel> (buffer, significant_bits (),
+                   plan_->partners->rectifier () ? &rectifying () : nullptr,
                    wanted ? &errors_of_other : nullptr));
   }
   const auto view = view_of<const Pixel> (coded);

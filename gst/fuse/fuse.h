@@ -71,6 +71,7 @@ private:
     return shared_.schedule->slots ();
   }
   RectifyOptions rectify_options (const Schedule &schedule) const override;
+  int threads () const override { return in_force_.threads; }
   SensorNoise noise (const Schedule &schedule) const;
   SensorNoise partner_noise (const CodedFormat &format) const;
   std::string method_name () const override;

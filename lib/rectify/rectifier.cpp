@@ -85,7 +85,8 @@ struct Rectifier::Plan {
   rectify::Filters filters_for (int largest) const;
   template <typename Pixel>
   Result<void> run (ImageView<const Pixel> from, ImageView<Pixel> to,
-      int largest, const std::optional<ImageView<float>> &errors) const;
+      int largest, const std::optional<ImageView<float>> &errors,
+      Workers *workers) const;
   template <typename Pixel>
   void mark_unknown (
       ImageView<const Pixel> from, ImageView<Pixel> to, Pixel largest) const;
@@ -393,7 +394,8 @@ Rectifier::Plan::filters_for (int largest) const
 template <typename Pixel>
 Result<void>
 Rectifier::Plan::run (ImageView<const Pixel> from, ImageView<Pixel> to,
-    int largest, const std::optional<ImageView<float>> &errors) const
+    int largest, const std::optional<ImageView<float>> &errors,
+    Workers *workers) const
 {
   const ViewBytes input = ViewBytes::of (from), output = ViewBytes::of (to);
   RETURN_IF_ERROR (
@@ -408,9 +410,14 @@ Rectifier::Plan::run (ImageView<const Pixel> from, ImageView<Pixel> to,
     largest = std::numeric_limits<Pixel>::max ();
   const rectify::Filters with = filters_for (largest);
   const rectify::Source<Pixel> source{from.row (0), from.stride, from.width};
-  for (int y = 0; y < mirrors.height; y++)
+  const auto run_one = [&] (int y, int) {
     run_row<Pixel> () (source, places.view ().row (y), mirrors.width, with,
         to.row (y), errors ? errors->row (y) : nullptr);
+  };
+  if (workers)
+    workers->run (mirrors.height, run_one);
+  for (int y = 0; !workers && y < mirrors.height; y++)
+    run_one (y, 0);
   if (keep_unknown)
     mark_unknown (from, to, Pixel (largest));
   return {};
@@ -530,17 +537,17 @@ Rectifier::correct (ImageView<std::uint16_t> mirrors,
 Result<void>
 Rectifier::run (ImageView<const std::uint8_t> camera,
     ImageView<std::uint8_t> mirrors, int largest,
-    const std::optional<ImageView<float>> &errors) const
+    const std::optional<ImageView<float>> &errors, Workers *workers) const
 {
-  return plan_->run (camera, mirrors, largest, errors);
+  return plan_->run (camera, mirrors, largest, errors, workers);
 }
 
 Result<void>
 Rectifier::run (ImageView<const std::uint16_t> camera,
     ImageView<std::uint16_t> mirrors, int largest,
-    const std::optional<ImageView<float>> &errors) const
+    const std::optional<ImageView<float>> &errors, Workers *workers) const
 {
-  return plan_->run (camera, mirrors, largest, errors);
+  return plan_->run (camera, mirrors, largest, errors, workers);
 }
 
 } // namespace codedexposure

@@ -62,8 +62,8 @@ struct RectifyReport {
  *
  * Weights are made once, for fractions of a pixel; along the borders of
  * regions, where pixels mix two codes, for each mirror. run () is const, can be
- * called from several threads, and allocates nothing, or, with keep_unknown,
- * a byte for each row of the camera.
+ * called from several threads, and allocates nothing, or a few bytes with
+ * workers, and with keep_unknown a byte for each row of the camera.
  */
 class Rectifier
 {
@@ -87,14 +87,18 @@ public:
    * @p errors   of mirrors, beyond the noise of a pixel: rms, DN, as expected
    *             of a scene whose light varies as much as the pixels around;
    *             0 where a pixel was copied.
+   * @p workers  share the rows; null: the caller's thread alone. The pixels do
+   *             not depend on it.
    * Error when a view does not have the size of camera () or mirrors (), or the
    * frames overlap. */
   Result<void> run (ImageView<const std::uint8_t> camera,
       ImageView<std::uint8_t> mirrors, int largest = 0,
-      const std::optional<ImageView<float>> &errors = {}) const;
+      const std::optional<ImageView<float>> &errors = {},
+      Workers *workers = nullptr) const;
   Result<void> run (ImageView<const std::uint16_t> camera,
       ImageView<std::uint16_t> mirrors, int largest = 0,
-      const std::optional<ImageView<float>> &errors = {}) const;
+      const std::optional<ImageView<float>> &errors = {},
+      Workers *workers = nullptr) const;
 
   /** Whether correct () is prepared, which it is only where it pays: where many
    * mirrors lie between pixels. */

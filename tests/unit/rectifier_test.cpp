@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "base/workers.h"
 #include "estimate/mirror_share.h"
 #include "misaligned.h"
 
@@ -292,6 +293,26 @@ TEST (Rectifier, PixelsOfSixteenBitsAreThoseOfEight)
   for (int y = 0; y < kSize.height; y++)
     for (int x = 0; x < kSize.width; x++)
       ASSERT_EQ (out.at (x, y), whole.at (x, y));
+}
+
+TEST (Rectifier, AnyNumberOfThreadsGivesTheSame)
+{
+  const Schedule schedule = schedule_of ("sequential:2x2");
+  const Alignment alignment = {0.4, 0.4, 0.5, 1.01};
+  const auto rectifier = made (mapping_of (alignment), schedule);
+  const auto frame = coded (alignment, schedule);
+  const auto whole = rectified (rectifier, frame);
+  Image<float> errors (kSize.width, kSize.height), all = errors;
+  Image<std::uint8_t> out (kSize.width, kSize.height);
+  ASSERT_TRUE (rectifier.run (frame.view (), out.view (), 0, errors.view ()));
+  for (const int threads : {1, 2, 5}) {
+    Workers workers (threads);
+    Image<std::uint8_t> shared (kSize.width, kSize.height);
+    ASSERT_TRUE (rectifier.run (
+        frame.view (), shared.view (), 0, all.view (), &workers));
+    EXPECT_EQ (shared, whole) << threads;
+    EXPECT_EQ (all, errors) << threads;
+  }
 }
 
 /* The estimate of a mirror has a part of one saturated pixel among others. */

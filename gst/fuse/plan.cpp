@@ -66,7 +66,7 @@ Fuse::properties ()
       {"threads", "Threads",
           "Threads, which do not change pixels; 0: one for each processor, and "
           "for quality fast without refine, the streaming thread only, but to "
-          "correct the frames of a second camera",
+          "rectify frames and to correct those of a second camera",
           kReadWrite, &FuseOptions::threads, 0u, guint (Workers::kMost)},
       {"range", "Range",
           "White of fused frames in whites of a coded frame; beyond 1, with "

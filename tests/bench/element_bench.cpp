@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-demux in a pipeline, from pad to pad, with the frames of a
- * camera's pool, compared with its kernel, a plain push and common elements.
- * Prints the last table of docs/performance.md. */
+ * camera's pool: on a real bench, and on an ideal one, where it is compared
+ * with its kernel, a plain push and common elements. Prints tables of
+ * docs/performance.md. */
 #include <cstdio>
 #include <cstring>
 #include <memory>
@@ -17,6 +18,7 @@
 #include "common/raii.h"
 #include "extract/extractor.h"
 #include "medians.h"
+#include "setup/bench_profile.h"
 
 namespace
 {
@@ -26,12 +28,15 @@ using namespace codedexposure::gst;
 
 constexpr guint kRing = 4; ///< frames in a camera's pool
 constexpr int kCameraRate = 25;
+constexpr int kBits = 12; ///< of a camera with 16 bits in memory
 
 /** An element between a source pad and a sink pad of the benchmark. */
 class Line
 {
 public:
-  Line (const std::string &launch, int width, int height, const char *format)
+  /** @p bench  text of the profile of the first element, or nothing. */
+  Line (const std::string &launch, int width, int height, const char *format,
+      const std::string &bench)
       : caps_ (
             gst_caps_from_string (caps_text (width, height, format).c_str ())),
         source_ (gst_pad_new ("source", GST_PAD_SRC)),
@@ -43,7 +48,7 @@ public:
     gst_pad_set_chain_function (sink_.get (), &Line::take);
     gst_pad_set_active (sink_.get (), TRUE);
     gst_pad_set_active (source_.get (), TRUE);
-    link (launch);
+    link (launch, bench);
     make_pool ();
     begin ();
   }
@@ -92,7 +97,7 @@ private:
     return GST_FLOW_OK;
   }
 
-  void link (const std::string &launch)
+  void link (const std::string &launch, const std::string &bench)
   {
     if (launch.empty ()) {
       gst_pad_link (source_.get (), sink_.get ());
@@ -106,6 +111,9 @@ private:
       std::exit (1);
     }
     gst_object_ref_sink (element_.get ());
+    if (!bench.empty ())
+      g_object_set (GST_BIN (element_.get ())->children->data, "bench",
+          bench.c_str (), nullptr);
     const ObjectPtr<GstPad> in (
         gst_element_get_static_pad (element_.get (), "sink"));
     const ObjectPtr<GstPad> out (
@@ -131,6 +139,9 @@ private:
     std::vector<std::uint8_t> pixels (size);
     for (auto &pixel : pixels)
       pixel = std::uint8_t (random () % 255);
+    if (GST_VIDEO_INFO_COMP_DEPTH (&info, 0) == 16)
+      for (std::size_t high = 1; high < pixels.size (); high += 2)
+        pixels[high] %= 1 << (kBits - 8);
     std::vector<BufferPtr> frames;
     for (guint i = 0; i < kRing; i++) {
       GstBuffer *frame = nullptr;
@@ -203,7 +214,37 @@ struct Contender {
   const char *format;
   std::string schedule; ///< of the kernel to compare with, if any
   Method method;
+  std::string bench = {};
 };
+
+/** What is measured of a real bench: one more in each step. */
+std::vector<Contender>
+real_benches (int width, int height)
+{
+  std::vector<Contender> all;
+  for (const char *preset : {"sequential:2x2", "sequential:4x4"}) {
+    BenchProfile bench;
+    bench.camera.size = {width, height};
+    const auto add = [&] (const std::string &name, const char *format) {
+      all.push_back ({name + ", " + preset,
+          std::string ("codedexposure-demux schedule=") + preset, format, "",
+          Method::kAuto, bench.to_json ()});
+    };
+    add ("ideal", "GRAY8");
+    bench.leak = Measured{0.001, 0.0001};
+    add ("leakage", "GRAY8");
+    bench.black_level = Measured{6.0, 0.1};
+    add ("and a black level", "GRAY8");
+    bench.bits = kBits;
+    add ("and 12 bits", "GRAY16_LE");
+    Mapping::Parts parts{bench.camera.size, bench.camera.size};
+    parts.homography = {1.0, 0.008, 0.3, -0.008, 1.0, 0.4, 0.0, 0.0, 1.0};
+    parts.psf_sigma = 0.3;
+    bench.mapping = Mapping::make (parts).value ();
+    add ("and a mapping", "GRAY16_LE");
+  }
+  return all;
+}
 
 std::vector<Contender>
 contenders ()
@@ -248,23 +289,24 @@ print_row (
 }
 
 void
-measure (int width, int height)
+measure (
+    const char *title, const std::vector<Contender> &all, int width, int height)
 {
   benchmark::ClearRegisteredBenchmarks ();
   std::vector<std::unique_ptr<Line>> lines;
   std::vector<std::unique_ptr<Kernel>> kernels;
-  const auto all = contenders ();
   for (const Contender &c : all) {
     Line *line = lines
                      .emplace_back (std::make_unique<Line> (
-                         c.launch, width, height, c.format))
+                         c.launch, width, height, c.format, c.bench))
                      .get ();
-    benchmark::RegisterBenchmark (
-        c.name.c_str (), [line] (benchmark::State &state) {
+    benchmark::RegisterBenchmark (c.name.c_str (),
+        [line] (benchmark::State &state) {
           for (auto _ : state)
             if (!line->push ())
               state.SkipWithError ("the element refuses the frame");
-        });
+        })
+        ->MeasureProcessCPUTime ();
     if (c.schedule.empty ())
       continue;
     Kernel *kernel = kernels
@@ -281,11 +323,11 @@ measure (int width, int height)
   benchmark::RunSpecifiedBenchmarks (&medians);
 
   std::printf (
-      "\n%dx%d, GRAY8 unless said otherwise\n\n"
+      "\n%s, %dx%d\n\n"
       "| | us a frame | frames/s | %% of a core at 25 frames/s | us an "
       "output buffer | kernel alone, us | above it, us an output "
       "buffer |\n|---|---|---|---|---|---|---|\n",
-      width, height);
+      title, width, height);
   for (std::size_t i = 0; i < all.size (); i++) {
     const double seconds = medians.seconds (all[i].name);
     if (seconds > 0.0)
@@ -307,6 +349,9 @@ main (int argc, char **argv)
   arguments.insert (arguments.end (), argv + 1, argv + argc);
   int count = int (arguments.size ());
   benchmark::Initialize (&count, const_cast<char **> (arguments.data ()));
-  measure (768, 576);
-  measure (4096, 3072);
+  constexpr Extent kSizes[] = {{768, 576}, {4096, 3072}};
+  for (const auto &[width, height] : kSizes)
+    measure ("real benches", real_benches (width, height), width, height);
+  for (const auto &[width, height] : kSizes)
+    measure ("GRAY8 unless said otherwise", contenders (), width, height);
 }

@@ -396,7 +396,7 @@ Result<void>
 Rectifier::Plan::run (ImageView<const Pixel> from, ImageView<Pixel> to,
     int largest, const std::optional<ImageView<float>> &errors,
     Workers *workers) const
-{
+try {
   const ViewBytes input = ViewBytes::of (from), output = ViewBytes::of (to);
   RETURN_IF_ERROR (
       check_view (input, "camera frame", camera.width, camera.height));
@@ -421,6 +421,8 @@ Rectifier::Plan::run (ImageView<const Pixel> from, ImageView<Pixel> to,
   if (keep_unknown)
     mark_unknown (from, to, Pixel (largest));
   return {};
+} catch (const std::bad_alloc &) {
+  return out_of_memory ();
 }
 
 namespace

@@ -537,10 +537,12 @@ Fuser<Pixel>::take (ImageView<const Pixel> coded,
   if (partner)
     RETURN_IF_ERROR (check_view (ViewBytes::of (*partner),
         "partner of the coded frame", whole.width, whole.height));
-  for (const auto &known : {errors.coded, errors.partner})
+  for (const auto &[known, name] :
+      {std::pair (errors.coded, "errors of the coded frame"),
+          std::pair (errors.partner, "errors of its partner")})
     if (known)
-      RETURN_IF_ERROR (check_view (ViewBytes::of (*known),
-          "errors of the coded frame", whole.width, whole.height));
+      RETURN_IF_ERROR (
+          check_view (ViewBytes::of (*known), name, whole.width, whole.height));
   return state_->or_forget (
       [&] { return state_->take (coded, partner, errors); });
 }

@@ -40,7 +40,7 @@ DecodeOptions::declare (Options &options)
   options.value ("--overlap", overlap, "N",
       "after --fuse: exposures that are fused for each coded frame; beyond 1, "
       "those between two frames make the first and last slots as true as the "
-      "others, in N times the time; as many as there are slots at most [1]",
+      "others, in N times the time; no more than there are slots count [1]",
       whole (1, 8));
   options.value ("--bench", bench, "FILE",
       "bench profile (JSON) with noise, black level, leakage and mapping; "

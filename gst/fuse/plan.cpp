@@ -58,7 +58,7 @@ Fuse::properties ()
           "Exposures that are fused for each coded frame: beyond 1, also those "
           "that begin in it and end in the next one, which makes the first and "
           "last slots of a frame as true as the others, in as many times the "
-          "time; as many as there are slots at most; needs lookahead=1; for "
+          "time; no more than there are slots count; needs lookahead=1; for "
           "one-hot codes and frames with hardly a "
           "gap, others stay as they are, with a warning",
           kReadWrite, &FuseOptions::overlap, 1u,

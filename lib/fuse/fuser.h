@@ -47,8 +47,8 @@ struct FuseOptions {
   double partner_black = 0.0;
   /** Later coded frames that are used to fuse one: 0 or 1. */
   int lookahead = 0;
-  /** Exposures that are fused for each coded frame, 1..8, and as many as there
-   * are slots at most. Beyond 1, those that
+  /** Exposures that are fused for each coded frame, 1..8; no more than there
+   * are slots count. Beyond 1, those that
    * begin in it and end in the next one are fused as well, so that the first
    * and the last slots are as true as those in the middle. It takes as many
    * times as long, and needs lookahead 1, a one-hot code, and coded frames that

@@ -14,9 +14,6 @@ namespace
 
 constexpr int kFrames = 8;
 constexpr int kBorder = 8;
-/* Around mirrors that a camera of another view does not see, there is one
- * camera. */
-constexpr int kWideBorder = 24;
 constexpr Condition kClean = {};
 constexpr Condition kNoisy = {.electrons = 10000.0, .read_noise = 5.0};
 

@@ -17,6 +17,10 @@ constexpr double kWhiteOfSecond = 0.95;
 /** Beside @p first. */
 Condition second_camera (const Condition &first, int slots);
 
+/** Around mirrors that a camera of another view does not see, there is one
+ * camera, px. */
+constexpr int kWideBorder = 24;
+
 /** With its own view, which its mapping has: a mirror image, turned by half a
  * degree, 1 % larger and shifted by (0.3, 0.4) px, behind a lens that blurs by
  * 0.3 px; by default seen from the front. */

@@ -27,8 +27,6 @@ using namespace codedexposure::quality;
 using Record = std::array<float, 13>;
 
 constexpr int kFrames = 16, kSide = 256;
-/* Beyond it, a camera of another view sees all mirrors. */
-constexpr int kWideBorder = 24;
 
 Scene
 cropped (const Scene &scene)
@@ -102,7 +100,7 @@ set_partner (
     }
 }
 
-/* A tenth of the pixels that are not static. */
+/* A sixteenth of the pixels that are not static. */
 void
 write_features (const Scene &scene, int number, int n, bool noisy, bool both,
     FuseQuality quality, const Setting &setting)

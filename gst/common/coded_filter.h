@@ -191,7 +191,7 @@ protected:
    */
   virtual int pictures_a_frame (const GstCodedPad *pad) const = 0;
   virtual RectifyOptions rectify_options (const Schedule &) const { return {}; }
-  /** Most that share what can be shared; 0: one for each processor. */
+  /** At most; 0: one for each processor. */
   virtual int threads () const { return 0; }
   /** How pictures are made, for their provenance: "select". */
   virtual std::string method_name () const = 0;
@@ -255,7 +255,7 @@ protected:
   Result<ImageView<const Pixel>> rectify (
       ImageView<const Pixel> coded, Image<float> *errors = nullptr);
   /** Share the rows of frames that are rectified; made when first needed. */
-  Workers &rectifying ();
+  Workers &rectify_workers ();
   /** Whether the segment contains the time from @p pts for @p duration. */
   bool is_within (GstClockTime pts, GstClockTime duration) const;
   /** Posts a message when a sequence of saturated frames begins, and when there
@@ -377,7 +377,7 @@ private:
     std::optional<RectifierCache> rectifiers;
     Scratch light; ///< a frame without its black level
     Scratch rectified;
-    std::unique_ptr<Workers> rectifying; ///< see rectifying ()
+    std::unique_ptr<Workers> workers; ///< see rectify_workers ()
   };
 
   /* Pads. */

@@ -377,7 +377,7 @@ CodedFilter::adopt (CodedFormat format, GstBuffer *next)
         format.rate, stream_.sequence ? stream_.sequence->next_number () : 0);
   stream_.format = std::move (format);
   stream_.stale = false;
-  stream_.rectifying.reset ();
+  stream_.workers.reset ();
   report_mirrors ();
   const CodedFormat &adopted = *stream_.format;
   if (before && !(*before == adopted.schedule))

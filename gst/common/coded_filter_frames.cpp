@@ -436,17 +436,17 @@ CodedFilter::Scratch::of (Extent size)
 }
 
 Workers &
-CodedFilter::rectifying ()
+CodedFilter::rectify_workers ()
 {
   constexpr int kRowsOfAThread = 64;
-  if (!stream_.rectifying) {
+  if (!stream_.workers) {
     const int most = std::clamp (format ().size.height / kRowsOfAThread, 1,
         std::max (int (std::thread::hardware_concurrency ()), 1));
     const int wanted = threads ();
-    stream_.rectifying =
+    stream_.workers =
         std::make_unique<Workers> (wanted > 0 ? std::min (wanted, most) : most);
   }
-  return *stream_.rectifying;
+  return *stream_.workers;
 }
 
 template <typename Pixel>
@@ -470,7 +470,7 @@ CodedFilter::rectify (ImageView<const Pixel> coded, Image<float> *errors)
     wanted = errors->view ();
   }
   if (const auto done = rectifier->run (coded, rectified.view (),
-          bits > 0 ? largest_pixel (bits) : 0, wanted, &rectifying ());
+          bits > 0 ? largest_pixel (bits) : 0, wanted, &rectify_workers ());
       !done)
     return done.error ();
   return ImageView<const Pixel> (rectified.view ());

@@ -209,10 +209,10 @@ Fuse::take_pixels (GstBuffer *buffer, MappedFrame &coded)
   const bool wanted = find_pad (*pads (), PadKind::uncertainty) != nullptr;
   std::optional<ImageView<const Pixel>> other;
   if (plan_->partners) {
-    ASSIGN_OR_RETURN (
-        other, plan_->partners->read<Pixel> (buffer, significant_bits (),
-                   plan_->partners->rectifier () ? &rectifying () : nullptr,
-                   wanted ? &errors_of_other : nullptr));
+    ASSIGN_OR_RETURN (other,
+        plan_->partners->read<Pixel> (buffer, significant_bits (),
+            plan_->partners->rectifier () ? &rectify_workers () : nullptr,
+            wanted ? &errors_of_other : nullptr));
   }
   const auto view = view_of<const Pixel> (coded);
   const guint64 saturated = count_saturated (view, significant_bits ());

@@ -213,7 +213,7 @@ Sum::add (CodedFrame &frame, MappedFrame &coded, MappedFrame &sum)
   const int bits = significant_bits ();
   ASSIGN_OR_RETURN (const auto other,
       plan_->partners.read<Pixel> (frame.buffer.get (), bits,
-          plan_->partners.rectifier () ? &rectifying () : nullptr));
+          plan_->partners.rectifier () ? &rectify_workers () : nullptr));
   if (!other)
     return false;
   ASSIGN_OR_RETURN (const auto own, rectify (view_of<const Pixel> (coded)));

@@ -12,7 +12,8 @@ namespace codedexposure
 namespace
 {
 
-/* Of one type and of a known number, compilers make vectors of them. */
+/* Where pixels are not widened, and blocks have a known length, the compiler
+ * uses vectors. */
 template <typename Pixel>
 void
 subtract (const Pixel *from, Pixel black, Pixel largest, int count, Pixel *to)

@@ -50,8 +50,8 @@ public:
   /** What @p light makes in row @p y of the partner. */
   void make (int y, const float *const *light, float *to) const;
 
-  /** By how much the light of @p slot follows that of the partner, of the
-   * pixels of row @p y. */
+  /** What a change by 1 of the partner's light changes that of @p slot by, for
+   * each pixel of row @p y. */
   void follow (int y, int slot, float *to) const;
 
 private:

@@ -164,8 +164,8 @@ private:
   Pixel copy_[kTaps * rectify::kRead] = {};
 };
 
-/** Some mirrors of a row, each step for all of them: what one waits for is
- * computed for others. */
+/** Some mirrors of a row. Each step is taken for all of them before the next
+ * one, so that the processor need not wait for the result of any. */
 template <int kTaps, typename Pixel>
 class Mirrors
 {

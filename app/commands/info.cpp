@@ -37,10 +37,11 @@ public:
         .usage = "[option...] RECORDING.mkv...",
         .description =
             "Shows the codec, size, rate, length and schedule of "
-            "recordings, without decoding\nthem. With --json, a list "
-            "with an object for each; one that is no recording has\n"
-            "the key \"error\". Exit status 1: one of them is "
-            "none.\n",
+            "recordings, without decoding\nthem. A complete one has as many "
+            "frames as were recorded, by its last line; a\nfinished one is "
+            "neither cut off nor damaged, but may be a part. With --json, a "
+            "list\nwith an object for each; one that is no recording has the "
+            "key \"error\". Exit\nstatus 1: one of them is none.\n",
         .examples = "  For people:\n"
                     "    codedexposure info coded.mkv\n"
                     "  All recordings of a day:\n"
@@ -77,9 +78,11 @@ public:
 private:
   Json describe (const std::string &path, const RecordingInfo &info) const
   {
+    const bool is_finished = !info.is_cut_short && !info.is_damaged;
     Json json{{"recording", path}, {"codec", codec_text (info.head.codec)},
         {"size", size_text (info.head.size)}, {"frames", info.times.size ()},
-        {"complete", !info.is_cut_short && !info.is_damaged},
+        {"finished", is_finished},
+        {"complete", is_finished && info.recorded == info.times.size ()},
         {"track", info.head.lines != 0}, {"period_ns", info.head.duration}};
     if (info.start)
       json["start_ns"] = *info.start;

@@ -336,15 +336,17 @@ def check_host(folder, plan_sha256):
 
 def main():
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # status | head
-    # The program that became this one blocked it, while Python started.
+    is_work = sys.argv[1:2] == ['work']
+    options = None if OF_DECODE or is_work else parse()
+    # The program that became this one blocked it, while Python starts and
+    # argparse, which cannot be stopped, reads options.
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     if OF_DECODE:
         recording, output, jobs, force, *rest = sys.argv[3:]
         engine.choose('parallel')
         return single.run(recording, output, int(jobs), bool(force), rest)
-    if sys.argv[1:2] == ['work']:
+    if is_work:
         return work(sys.argv[2:])
-    options = parse()
     if options.command == 'plan':
         return show_plan(options)
     if options.command == 'submit':

@@ -20,16 +20,21 @@ struct Philox {
   using Words = std::array<std::uint32_t, 4>;
   using Key = std::array<std::uint32_t, 2>;
 
+  static constexpr int kRounds = 10;
+  static constexpr std::uint32_t kFirst = 0xD2511F53u, kSecond = 0xCD9E8D57u;
+  static constexpr std::uint32_t kFirstStep = 0x9E3779B9u,
+                                 kSecondStep = 0xBB67AE85u;
+
   static constexpr Words draw (Words counter, Key key)
   {
-    for (int round = 0; round < 10; round++) {
-      const std::uint64_t a = std::uint64_t (0xD2511F53u) * counter[0];
-      const std::uint64_t b = std::uint64_t (0xCD9E8D57u) * counter[2];
+    for (int round = 0; round < kRounds; round++) {
+      const std::uint64_t a = std::uint64_t (kFirst) * counter[0];
+      const std::uint64_t b = std::uint64_t (kSecond) * counter[2];
       counter = {std::uint32_t (b >> 32) ^ counter[1] ^ key[0],
           std::uint32_t (b), std::uint32_t (a >> 32) ^ counter[3] ^ key[1],
           std::uint32_t (a)};
-      key[0] += 0x9E3779B9u;
-      key[1] += 0xBB67AE85u;
+      key[0] += kFirstStep;
+      key[1] += kSecondStep;
     }
     return counter;
   }

@@ -9,6 +9,8 @@
  * synchronisation, lost frames, flags, a hash of the pixels, and the schedule
  * and mapping. #codedexposure-recorddemux reads it.
  *
+ * FFV1 cannot keep frames of one row or column; they are stored raw.
+ *
  * The element encodes in one thread of its own and writes in that of its
  * encoder. Put a `queue` in front of it if the source must not wait; frames
  * that such a queue drops (`leaky=downstream`) are counted as lost in the line
@@ -55,6 +57,7 @@
 #include "common/raii.h"
 #include "common/tag.h"
 #include "container.h"
+#include "ffv1_encoder.h"
 #include "parts.h"
 
 using namespace codedexposure;
@@ -296,18 +299,14 @@ add_branch (GstElement *self, Branch &branch)
     add_tracks (state.mux, branch);
 }
 
-/* Bytes depend on the slices, not on the threads. */
 bool
 add_encoder (GstElement *self, Branch &branch, guint threads)
 {
-  branch.encoder = gst_element_factory_make ("avenc_ffv1", nullptr);
+  branch.encoder = make_ffv1_encoder (threads);
   if (!branch.encoder) {
     POST_ERROR (self, CORE, MISSING_PLUGIN, missing ("avenc_ffv1"));
     return false;
   }
-  g_object_set (branch.encoder, "gop-size", 1, "slices", 4, nullptr);
-  gst_util_set_object_arg (G_OBJECT (branch.encoder), "threads",
-      threads == 0 ? "auto" : std::to_string (threads).c_str ());
   gst_bin_add (GST_BIN (self), branch.encoder);
   return gst_element_link (branch.frames, branch.encoder) &&
          gst_pad_link (pad_of (branch.encoder, "src").get (), branch.video) ==
@@ -340,7 +339,10 @@ add_partner (GstElement *self)
   auto &state = state_in<Self> (self);
   Branch &branch = state.partner;
   add_branch (self, branch);
-  if (!begin_branch (self, branch, settings_of (as<Self> (self))))
+  Settings settings = settings_of (as<Self> (self));
+  if (!state.coded.encoder)
+    settings.codec = Codec::raw;
+  if (!begin_branch (self, branch, settings))
     return;
   for (GstElement *part :
       {branch.lines, branch.encoder, branch.frames, branch.log})
@@ -402,6 +404,18 @@ follow_tags (GstElement *self, GstEvent *event)
     add_partner (self);
 }
 
+/* What FFV1 cannot keep is kept raw. */
+void
+follow_caps (GstElement *self, GstEvent *event)
+{
+  auto &state = state_in<Self> (self);
+  Branch &branch = state.coded;
+  if (state.has_begun || !branch.encoder || ffv1_keeps (caps_of (event)))
+    return;
+  remove_part (self, branch.encoder);
+  gst_pad_link (pad_of (branch.frames, "src").get (), branch.video);
+}
+
 GstPadProbeReturn
 on_input (GstPad *, GstPadProbeInfo *info, gpointer data) noexcept
 {
@@ -415,6 +429,8 @@ on_input (GstPad *, GstPadProbeInfo *info, gpointer data) noexcept
   else if (!event || GST_EVENT_IS_SERIALIZED (event))
     if (std::exchange (state.was_flushed, false))
       begin_anew (self);
+  if (event && GST_EVENT_TYPE (event) == GST_EVENT_CAPS)
+    follow_caps (self, event);
   if (event && GST_EVENT_TYPE (event) == GST_EVENT_TAG)
     follow_tags (self, event);
   state.has_begun |= is_frame;

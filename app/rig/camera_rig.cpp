@@ -276,8 +276,7 @@ CameraRig::open_second ()
     return {};
   CameraRigOptions options{*options_.second, options_.plan};
   second_ = std::make_unique<CameraRig> (std::move (options), *this);
-  const auto opened = second_->open ();
-  return opened ? opened : opened.error ().with_prefix ("the second camera: ");
+  return with_prefix (second_->open (), "the second camera: ");
 }
 
 /* ------------------------------------------------------ mirrors and frames --

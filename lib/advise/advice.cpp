@@ -117,10 +117,10 @@ predict_regions (const Schedule &whole, const Conditions &conditions)
     const Rect &rect = whole.regions ()[i].rect;
     Conditions inside = conditions;
     inside.camera.size = {rect.width, rect.height};
-    auto part = predict_part (whole.region (int (i)), inside);
-    if (!part)
-      return part.error ().with_prefix ("region " + std::to_string (i) + ": ");
-    parts.push_back (*std::move (part));
+    ASSIGN_OR_RETURN (Prediction part,
+        with_prefix (predict_part (whole.region (int (i)), inside),
+            "region " + std::to_string (i) + ": "));
+    parts.push_back (std::move (part));
     shares.push_back (double (rect.width) * rect.height /
                       (double (size.width) * size.height));
     shares.front () -= shares.back ();

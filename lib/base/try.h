@@ -2,7 +2,24 @@
 /* Passes errors on to the caller; for source files of lib/ only. */
 #pragma once
 
+#include <string>
 #include <utility>
+
+#include "base/result.h"
+
+namespace codedexposure
+{
+
+/** @p result; if it is an error, with @p prefix before the message. */
+template <typename T>
+Result<T>
+with_prefix (Result<T> result, const std::string &prefix)
+{
+  return result ? std::move (result)
+                : Result<T> (result.error ().with_prefix (prefix));
+}
+
+} // namespace codedexposure
 
 /** Returns the error of a Result from the enclosing function, if it has one. */
 #define RETURN_IF_ERROR(...)                                                   \

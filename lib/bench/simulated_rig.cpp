@@ -281,17 +281,17 @@ SimulatedRig::show (const StillMask &mask, int slots)
   }
   ASSIGN_OR_RETURN (
       const SlotPlan plan, SlotPlan::fit ({}, slots, options_.rate));
-  const auto times = fit_still (plan, mask, *parts_.dmd.patterns);
-  if (!times)
-    return times.error ().with_prefix (parts_.dmd.name + ": ");
+  ASSIGN_OR_RETURN (const StillTimes times,
+      with_prefix (fit_still (plan, mask, *parts_.dmd.patterns),
+          parts_.dmd.name + ": "));
   MirrorProgram program{.period = options_.rate.period ()};
   program.masks = {std::make_shared<Image<std::uint8_t>> (
       render_still<std::uint8_t> (mask, options_.mirrors).image ())};
-  const Nanoseconds begin = times->before * kMicrosecond;
+  const Nanoseconds begin = times.before * kMicrosecond;
   /* The whole of a period has no dark nanosecond at its end. */
-  const Nanoseconds end = times->lit.dark == 0
+  const Nanoseconds end = times.lit.dark == 0
                               ? program.period
-                              : begin + times->lit.exposure * kMicrosecond;
+                              : begin + times.lit.exposure * kMicrosecond;
   program.stretches = {{begin, end, 0}};
   program.slot = program.period / slots;
   start (std::move (program), transfer_time (mask, options_.mirrors));

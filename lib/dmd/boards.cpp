@@ -215,11 +215,10 @@ parse_board (std::string_view text)
   const auto facts = found ? std::optional (*found) : alp_board (name);
   if (!facts)
     return Error{"unknown DMD " + in_quotes (name) + "; use " + board_names ()};
-  auto info = board_info (*facts, options);
-  if (!info)
-    return info.error ().with_prefix (name + ": ");
-  info->name = name;
-  return NamedBoard{facts->controller, options, *std::move (info)};
+  ASSIGN_OR_RETURN (
+      DmdInfo info, with_prefix (board_info (*facts, options), name + ": "));
+  info.name = name;
+  return NamedBoard{facts->controller, options, std::move (info)};
 }
 
 } // namespace codedexposure

@@ -227,14 +227,14 @@ Dlpc350::start (const SlotPlan &plan, std::stop_token stop_token)
 {
   if (masks_.empty ())
     return Error{info_.name + ": no masks to start; upload first"};
-  const auto time = fit_equal_patterns (plan, *info_.patterns);
-  if (!time)
-    return time.error ().with_prefix (info_.name + ": ");
+  ASSIGN_OR_RETURN (const PatternTime time,
+      with_prefix (
+          fit_equal_patterns (plan, *info_.patterns), info_.name + ": "));
   RETURN_IF_ERROR (watch ());
   begin (std::move (stop_token));
   // After every stop, the board needs its tables and their validation again.
   RETURN_IF_ERROR (halt ());
-  RETURN_IF_ERROR (send_tables (*time));
+  RETURN_IF_ERROR (send_tables (time));
   RETURN_IF_ERROR (validate ());
   RETURN_IF_ERROR (pause_frame (plan));
   return run ();

@@ -124,7 +124,6 @@ public:
 
 private:
   std::string explain () override;
-  Result<std::vector<PatternTime>> times_of (const SlotPlan &plan) const;
   UploadPlan plan_upload (const Schedule &schedule) const;
   std::vector<Halves> encode (const Schedule &schedule,
       const std::vector<int> &images, const std::stop_token &stop) const;
@@ -208,15 +207,6 @@ Dlpc900::open ()
   if (const auto binary = minima ? read_le (*minima, 0, 2) : 0; binary > 0)
     unit.limits.minimum_exposure = unit.limits.minimum_dark = binary;
   return set_info (unit);
-}
-
-Result<std::vector<PatternTime>>
-Dlpc900::times_of (const SlotPlan &plan) const
-{
-  const auto times = fit_patterns (plan, *info_.patterns);
-  if (!times)
-    return times.error ().with_prefix (info_.name + ": ");
-  return times;
 }
 
 Result<DmdStatus>
@@ -467,7 +457,8 @@ Dlpc900::start (const SlotPlan &plan, std::stop_token stop_token)
   if (plan.slots () != slots_)
     return Error{info_.name + ": the masks are for " + std::to_string (slots_) +
                  " slots, not for " + std::to_string (plan.slots ())};
-  ASSIGN_OR_RETURN (const auto times, times_of (plan));
+  ASSIGN_OR_RETURN (const auto times,
+      with_prefix (fit_patterns (plan, *info_.patterns), info_.name + ": "));
   RETURN_IF_ERROR (watch ());
   begin (std::move (stop_token));
   const auto started = run (times, plan);
@@ -493,14 +484,13 @@ Result<void>
 Dlpc900::show (
     const StillMask &mask, const SlotPlan &plan, std::stop_token stop_token)
 {
-  const auto still = fit_still (plan, mask, *info_.patterns);
-  if (!still)
-    return still.error ().with_prefix (info_.name + ": ");
+  ASSIGN_OR_RETURN (const StillTimes still,
+      with_prefix (fit_still (plan, mask, *info_.patterns), info_.name + ": "));
   RETURN_IF_ERROR (watch ());
   touched_ = true;
-  std::vector<PatternTime> times{still->lit};
-  if (still->before > 0)
-    times.insert (times.begin (), {still->before, 0});
+  std::vector<PatternTime> times{still.lit};
+  if (still.before > 0)
+    times.insert (times.begin (), {still.before, 0});
   begin (std::move (stop_token));
   auto shown = send_still (mask, times);
   if (shown)

@@ -13,10 +13,8 @@ Result<void>
 DlpcBoard::set_info (const BoardFacts &facts)
 {
   const std::string name = link_->name () + " (" + facts.mirrors + ")";
-  auto info = board_info (facts, options_);
-  if (!info)
-    return info.error ().with_prefix (name + ": ");
-  info_ = *std::move (info);
+  ASSIGN_OR_RETURN (
+      info_, with_prefix (board_info (facts, options_), name + ": "));
   info_.name = name;
   info_.serial = link_->serial ();
   return {};

@@ -83,10 +83,9 @@ check_limits (
   const std::string slots = std::to_string (schedule.slots ()) + " slots";
   RETURN_IF_ERROR (check_masks (info, schedule));
   if (info.array == Array::orthogonal)
-    if (const auto within =
-            schedule.check_size (info.shown ().width, info.shown ().height);
-        !within)
-      return within.error ().with_prefix (info.name + ": ");
+    RETURN_IF_ERROR (with_prefix (
+        schedule.check_size (info.shown ().width, info.shown ().height),
+        info.name + ": "));
   if (info.most_slots > 0 && schedule.slots () > info.most_slots)
     return Error{info.name + " gives the camera a pulse after " +
                  std::to_string (info.most_slots) +
@@ -103,10 +102,9 @@ check_limits (
                  " to switch masks, the schedule leaves " +
                  time_text (schedule.timing ().switching) +
                  "; give it switching=" + time_text (info.minimum_switching)};
-  if (info.patterns)
-    if (const auto times = check_patterns (plan, *info.patterns); !times)
-      return times.error ().with_prefix (info.name + ": ");
-  return {};
+  if (!info.patterns)
+    return {};
+  return with_prefix (check_patterns (plan, *info.patterns), info.name + ": ");
 }
 
 } // namespace codedexposure

@@ -106,11 +106,9 @@ Lightcrafter::connect ()
 {
   if (stream_)
     return {};
-  auto stream = TcpStream::connect (host_, port_, patience_, cancel_);
-  if (!stream)
-    return Error{
-        info_.name + ": " + stream.error ().message, stream.error ().code};
-  stream_ = *std::move (stream);
+  ASSIGN_OR_RETURN (stream_,
+      with_prefix (TcpStream::connect (host_, port_, patience_, cancel_),
+          info_.name + ": "));
   return {};
 }
 
@@ -192,11 +190,11 @@ Lightcrafter::open ()
                                ask (PacketType::read, kVersion, of_system)));
   version_ = printable (std::string (
       version.begin (), std::find (version.begin (), version.end (), 0)));
-  auto info = board_info (*find_board ("dlp3000"), options_);
-  if (!info)
-    return info.error ().with_prefix (info_.name + ": ");
-  info->name = std::move (info_.name);
-  info_ = *std::move (info);
+  ASSIGN_OR_RETURN (
+      DmdInfo info, with_prefix (board_info (*find_board ("dlp3000"), options_),
+                        info_.name + ": "));
+  info.name = std::move (info_.name);
+  info_ = std::move (info);
   return {};
 }
 
@@ -281,13 +279,13 @@ Lightcrafter::start (const SlotPlan &plan, std::stop_token stop_token)
 {
   if (!schedule_)
     return Error{info_.name + ": no masks to start; upload first"};
-  const auto time = fit_equal_patterns (plan, *info_.patterns);
-  if (!time)
-    return time.error ().with_prefix (info_.name + ": ");
+  ASSIGN_OR_RETURN (const PatternTime time,
+      with_prefix (
+          fit_equal_patterns (plan, *info_.patterns), info_.name + ": "));
   RETURN_IF_ERROR (watch ());
   RETURN_IF_ERROR (begin (std::move (stop_token)));
-  if (*time != time_)
-    RETURN_IF_ERROR (send_masks (*time, [] (int, int) {}));
+  if (time != time_)
+    RETURN_IF_ERROR (send_masks (time, [] (int, int) {}));
   RETURN_IF_ERROR (write ("set up the trigger output", kCameraTrigger,
       encode_camera_trigger (options_.master == Master::dmd, kCameraPulse)));
   if (!wait_for (cancel_, std::chrono::nanoseconds (plan.frame_period ())))

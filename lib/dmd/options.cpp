@@ -64,8 +64,8 @@ parse_device (std::string_view device, std::span<const DeviceKey> keys)
 {
   const auto parts = split (device, ',');
   for (std::size_t i = 1; i < parts.size (); i++)
-    if (const auto set = set_option (parts[i], keys); !set)
-      return set.error ().with_prefix ("DMD " + in_quotes (device) + ": ");
+    RETURN_IF_ERROR (with_prefix (
+        set_option (parts[i], keys), "DMD " + in_quotes (device) + ": "));
   return std::string (parts.front ().substr (parts.front ().find (':') + 1));
 }
 

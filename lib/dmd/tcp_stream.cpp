@@ -69,8 +69,8 @@ TcpStream::connect (const std::string &host, int port, Milliseconds timeout,
   if (::connect (socket, raw->ai_addr, raw->ai_addrlen) != 0)
     code = errno;
   if (code == EINPROGRESS) {
-    if (const auto ready = stream->wait_for (POLLOUT, deadline); !ready)
-      return ready.error ().with_prefix ("cannot connect to " + where + ": ");
+    RETURN_IF_ERROR (with_prefix (stream->wait_for (POLLOUT, deadline),
+        "cannot connect to " + where + ": "));
     socklen_t size = sizeof code;
     getsockopt (socket, SOL_SOCKET, SO_ERROR, &code, &size);
   }

@@ -247,16 +247,15 @@ open_pipe (const Context &context, const Found &found)
 {
   const std::string what = "cannot open the board at USB " + found.board.port;
   ASSIGN_OR_RETURN (Handle handle, open_handle (found, what));
-  const auto endpoints = find_endpoints (found.device.get ());
-  if (!endpoints)
-    return endpoints.error ().with_prefix (what + ": ");
+  ASSIGN_OR_RETURN (const Endpoints endpoints,
+      with_prefix (find_endpoints (found.device.get ()), what + ": "));
   // The kernel's HID driver binds to these boards.
   libusb_set_auto_detach_kernel_driver (handle.get (), 1);
   if (const int code = libusb_claim_interface (handle.get (), kInterface);
       code != 0)
     return usb_error (what, code);
   return std::unique_ptr<PacketPipe> (
-      std::make_unique<UsbPipe> (context, std::move (handle), *endpoints));
+      std::make_unique<UsbPipe> (context, std::move (handle), endpoints));
 }
 
 std::string

@@ -2,6 +2,8 @@
 /* The versioned JSON form of mappings: docs/formats.md. */
 #include "mapping/json.h"
 
+#include "base/try.h"
+
 namespace codedexposure
 {
 
@@ -117,8 +119,7 @@ Mapping::load (const std::string &path)
 Result<void>
 Mapping::save (const std::string &path) const
 try {
-  const auto written = write_file (path, to_json () + '\n');
-  return written ? written : written.error ().with_prefix ("the mapping ");
+  return with_prefix (write_file (path, to_json () + '\n'), "the mapping ");
 } catch (const std::bad_alloc &) {
   return out_of_memory ();
 }

@@ -58,10 +58,8 @@ template <Nanoseconds Timing::*kTime>
 Result<void>
 read_time (std::string_view key, std::string_view value, Schedule::Parts &parts)
 {
-  const auto time = parse_time (value);
-  if (!time)
-    return time.error ().with_prefix (std::string (key) + ": ");
-  parts.timing.*kTime = *time;
+  ASSIGN_OR_RETURN (parts.timing.*kTime,
+      with_prefix (parse_time (value), std::string (key) + ": "));
   return {};
 }
 
@@ -265,10 +263,7 @@ read_json_file (std::string_view path)
             "file unless it begins with sequential:, staircase: or "
             "s-matrix:",
         content.error ().code};
-  auto schedule = Schedule::from_json (*content);
-  if (!schedule)
-    return schedule.error ().with_prefix (what);
-  return schedule;
+  return with_prefix (Schedule::from_json (*content), what);
 }
 
 /** Order and phase, each after @p separator, where they say anything. */
@@ -319,11 +314,8 @@ try {
 Result<Schedule>
 Schedule::from_preset (std::string_view preset)
 try {
-  auto schedule = read_preset (preset);
-  if (!schedule)
-    return schedule.error ().with_prefix (
-        "schedule " + in_quotes (preset) + ": ");
-  return schedule;
+  return with_prefix (
+      read_preset (preset), "schedule " + in_quotes (preset) + ": ");
 } catch (const std::bad_alloc &) {
   return out_of_memory ();
 }

@@ -119,9 +119,7 @@ BenchProfile::check () const
       return Error{
           "the second camera of a profile has no second one itself; leave "
           "it out"};
-    const auto good = other.check ();
-    if (!good)
-      return good.error ().with_prefix ("second camera: ");
+    RETURN_IF_ERROR (with_prefix (other.check (), "second camera: "));
     if (mapping && other.mapping &&
         !(mapping->mirrors () == other.mapping->mirrors ()))
       return Error{
@@ -156,9 +154,8 @@ Result<void>
 BenchProfile::save (const std::string &path) const
 try {
   RETURN_IF_ERROR (check ());
-  const auto written = write_file (path, to_json () + '\n');
-  return written ? written
-                 : written.error ().with_prefix ("the bench profile ");
+  return with_prefix (
+      write_file (path, to_json () + '\n'), "the bench profile ");
 } catch (const std::bad_alloc &) {
   return out_of_memory ();
 }

@@ -5,6 +5,7 @@
  * thread finds the first frame that shows it and names it in the meta of that
  * frame and the next ones. Nobody waits for the device.
  */
+#include "base/statistics.h"
 #include "calibrate/gratings.h"
 #include "common/messages.h"
 #include "common/meta.h"
@@ -123,7 +124,7 @@ level_of (const GstVideoInfo &info, GstBuffer *buffer)
   MappedFrame mapped (info, buffer, GST_MAP_READ);
   if (!mapped)
     return 0.0;
-  return read_pixels (mapped, [] (auto pixels) { return mean_level (pixels); });
+  return read_pixels (mapped, [] (auto pixels) { return mean_of (pixels); });
 }
 
 } // namespace

@@ -31,6 +31,12 @@ camera_of (const PairStream &stream, const std::optional<Mapping> &mapping)
   return camera;
 }
 
+GreyView
+grey_view (MappedFrame &mapped)
+{
+  return read_pixels (mapped, [] (auto pixels) { return GreyView (pixels); });
+}
+
 } // namespace
 
 std::optional<PairStream>
@@ -75,29 +81,15 @@ PairCheck::reset ()
     watch_->reset ();
 }
 
-template <typename Use>
-auto
-PairCheck::read (GstBuffer *coded, GstBuffer *partner, Use use) const
-{
-  MappedFrame on (on_, coded, GST_MAP_READ);
-  MappedFrame off (off_, partner, GST_MAP_READ);
-  using Result = decltype (use (
-      ImageView<const std::uint8_t> (), ImageView<const std::uint8_t> ()));
-  if (!on || !off)
-    return Result ();
-  return read_pixels (on, [&] (const auto &first) {
-    return read_pixels (
-        off, [&] (const auto &second) { return use (first, second); });
-  });
-}
-
 Verdict
 PairCheck::check (GstBuffer *coded, GstBuffer *partner)
 {
   if (!watch_)
     return Verdict::unknown;
-  return read (coded, partner,
-      [&] (const auto &on, const auto &off) { return watch_->take (on, off); });
+  MappedFrame on (on_, coded, GST_MAP_READ);
+  MappedFrame off (off_, partner, GST_MAP_READ);
+  return on && off ? watch_->take (grey_view (on), grey_view (off))
+                   : Verdict::unknown;
 }
 
 void
@@ -105,8 +97,7 @@ PairCheck::take_alone (GstBuffer *frame, bool off)
 {
   MappedFrame mapped (off ? off_ : on_, frame, GST_MAP_READ);
   if (watch_ && mapped)
-    read_pixels (
-        mapped, [&] (const auto &view) { watch_->take_alone (view, off); });
+    watch_->take_alone (grey_view (mapped), off);
 }
 
 std::optional<PartnerDrift::Shift>
@@ -114,9 +105,10 @@ PairCheck::drift (GstBuffer *coded, GstBuffer *partner) const
 {
   if (!drift_)
     return {};
-  return read (coded, partner, [&] (const auto &on, const auto &off) {
-    return drift_->largest (on, off);
-  });
+  MappedFrame on (on_, coded, GST_MAP_READ);
+  MappedFrame off (off_, partner, GST_MAP_READ);
+  return on && off ? drift_->largest (grey_view (on), grey_view (off))
+                   : std::nullopt;
 }
 
 } // namespace codedexposure::gst

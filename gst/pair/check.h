@@ -41,11 +41,6 @@ public:
       GstBuffer *coded, GstBuffer *partner) const;
 
 private:
-  /** What @p use makes of the pixels of both; its default if they cannot be
-   * read. */
-  template <typename Use>
-  auto read (GstBuffer *coded, GstBuffer *partner, Use use) const;
-
   std::optional<PartnerWatch> watch_;
   std::optional<PartnerDrift> drift_; ///< none: masks are not of one period
   GstVideoInfo on_ = {}, off_ = {};

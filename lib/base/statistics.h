@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -70,10 +72,10 @@ template <typename T>
 double
 mean_of (ImageView<T> picture)
 {
-  double sum = 0.0;
-  each_pixel (
-      picture, [&] (int x, int y) { sum += double (picture.at (x, y)); });
-  return sum / std::max (1.0, double (picture.width) * picture.height);
+  /* Whole numbers are added much faster. */
+  std::conditional_t<std::is_integral_v<T>, std::uint64_t, double> sum = 0;
+  each_pixel (picture, [&] (int x, int y) { sum += picture.at (x, y); });
+  return double (sum) / std::max (1.0, double (picture.width) * picture.height);
 }
 
 /** @p a less @p b, which has the same size. */

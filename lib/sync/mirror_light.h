@@ -3,6 +3,9 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
+#include <span>
+#include <variant>
 
 #include "base/geometry.h"
 #include "base/image.h"
@@ -46,6 +49,23 @@ bilinear (ImageView<const Pixel> frame, Position at)
   return (frame.at (x, y) * (1.0 - dx) + frame.at (right, y) * dx) *
              (1.0 - dy) +
          (frame.at (x, below) * (1.0 - dx) + frame.at (right, below) * dx) * dy;
+}
+
+/** A frame of 8 or 16 bits. */
+using GreyView =
+    std::variant<ImageView<const std::uint8_t>, ImageView<const std::uint16_t>>;
+
+/** Calls @p use with the level at each of @p places. */
+template <typename Use>
+void
+each_level (const GreyView &frame, std::span<const Position> places, Use use)
+{
+  std::visit (
+      [&] (const auto &pixels) {
+        for (const Position at : places)
+          use (bilinear (pixels, at));
+      },
+      frame);
 }
 
 } // namespace codedexposure

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "base/statistics.h"
 #include "estimate/least_squares.h"
 
 namespace codedexposure
@@ -46,18 +47,6 @@ weights_of (int size)
 
 } // namespace
 
-/* Sums over a period around each mirror of a part; not a number where some of
- * it is saturated. */
-struct PartnerDrift::Picture {
-  Extent size;
-  std::vector<float> levels;
-
-  float at (int x, int y) const
-  {
-    return levels[std::size_t (y) * std::size_t (size.width) + std::size_t (x)];
-  }
-};
-
 PartnerDrift::PartnerDrift (
     const Schedule &schedule, const BeamCamera &on, const BeamCamera &off)
     : period_ (window_of (schedule.tile ())), white_on_ (on.white),
@@ -86,56 +75,53 @@ PartnerDrift::PartnerDrift (
   }
 }
 
-template <typename Pixel>
-PartnerDrift::Picture
-PartnerDrift::picture (ImageView<const Pixel> frame,
+/* Sums over a period around each mirror of a part; not a number where some of
+ * it is saturated. */
+Image<float>
+PartnerDrift::picture (const GreyView &frame,
     const std::vector<Position> &places, double white) const
 {
   const auto row = weights_of (period_.width);
   const auto column = weights_of (period_.height);
   const int wide = int (row.size ()) - 1, high = int (column.size ()) - 1;
-  std::vector<float> levels, sums;
+  std::vector<float> levels;
   levels.reserve (places.size ());
-  for (const Position place : places) {
-    const double level = bilinear (frame, place);
+  each_level (frame, places, [&] (double level) {
     levels.push_back (level < white ? float (level) : kNone);
-  }
+  });
   const auto width = std::size_t (part_.width);
   const Extent inner{part_.width - wide, part_.height - high};
   if (inner.width < 1 || inner.height < 1)
     return {};
-  for (int y = 0; y < part_.height; y++)
-    for (int x = 0; x < inner.width; x++) {
-      float sum = 0.0f;
-      for (std::size_t i = 0; i < row.size (); i++)
-        sum += row[i] * levels[std::size_t (y) * width + std::size_t (x) + i];
-      sums.push_back (sum);
-    }
-  Picture picture{inner, {}};
-  for (int y = 0; y < inner.height; y++)
-    for (int x = 0; x < inner.width; x++) {
-      float sum = 0.0f;
-      for (std::size_t j = 0; j < column.size (); j++)
-        sum +=
-            column[j] * sums[(std::size_t (y) + j) * std::size_t (inner.width) +
-                             std::size_t (x)];
-      picture.levels.push_back (sum);
-    }
-  return picture;
+  Image<float> rows (inner.width, part_.height);
+  each_pixel (rows, [&] (int x, int y) {
+    float sum = 0.0f;
+    for (std::size_t i = 0; i < row.size (); i++)
+      sum += row[i] * levels[std::size_t (y) * width + std::size_t (x) + i];
+    rows.at (x, y) = sum;
+  });
+  Image<float> sums (inner.width, inner.height);
+  each_pixel (sums, [&] (int x, int y) {
+    float sum = 0.0f;
+    for (std::size_t j = 0; j < column.size (); j++)
+      sum += column[j] * rows.at (x, y + int (j));
+    sums.at (x, y) = sum;
+  });
+  return sums;
 }
 
 /* The picture of the second camera is that of the first, less its gradient
  * times the shift, times a factor, on another level. */
 std::optional<PartnerDrift::Shift>
 PartnerDrift::shift (
-    const Picture &on, const Picture &off, Position middle) const
+    const Image<float> &on, const Image<float> &off, Position middle) const
 {
   enum { kOne, kFactor, kAlongX, kAlongY, kUnknowns };
   using Row = Eigen::Matrix<double, kUnknowns + 1, 1>;
   Eigen::Matrix<double, kUnknowns + 1, kUnknowns + 1> sums;
   sums.setZero ();
-  for (int y = 1; y < on.size.height - 1; y++)
-    for (int x = 1; x < on.size.width - 1; x++) {
+  for (int y = 1; y < on.height () - 1; y++)
+    for (int x = 1; x < on.width () - 1; x++) {
       Row row;
       row << 1.0, on.at (x, y), (on.at (x + 1, y) - on.at (x - 1, y)) / 2.0,
           (on.at (x, y + 1) - on.at (x, y - 1)) / 2.0, off.at (x, y);
@@ -163,10 +149,8 @@ PartnerDrift::shift (
       uncertainty, middle};
 }
 
-template <typename Pixel, typename OtherPixel>
 std::optional<PartnerDrift::Shift>
-PartnerDrift::largest (
-    ImageView<const Pixel> on, ImageView<const OtherPixel> off) const
+PartnerDrift::largest (const GreyView &on, const GreyView &off) const
 {
   std::optional<Shift> largest;
   const auto length = [] (const Shift &shift) {
@@ -180,14 +164,5 @@ PartnerDrift::largest (
   }
   return largest;
 }
-
-template std::optional<PartnerDrift::Shift> PartnerDrift::largest (
-    ImageView<const std::uint8_t>, ImageView<const std::uint8_t>) const;
-template std::optional<PartnerDrift::Shift> PartnerDrift::largest (
-    ImageView<const std::uint16_t>, ImageView<const std::uint16_t>) const;
-template std::optional<PartnerDrift::Shift> PartnerDrift::largest (
-    ImageView<const std::uint8_t>, ImageView<const std::uint16_t>) const;
-template std::optional<PartnerDrift::Shift> PartnerDrift::largest (
-    ImageView<const std::uint16_t>, ImageView<const std::uint8_t>) const;
 
 } // namespace codedexposure

@@ -42,23 +42,19 @@ public:
       const Schedule &schedule, const BeamCamera &on, const BeamCamera &off);
 
   /** Of the part where it is largest; none: there is no texture, or no place
-   * where both cameras see a period. For 8 and 16 bits. */
-  template <typename Pixel, typename OtherPixel>
-  std::optional<Shift> largest (
-      ImageView<const Pixel> on, ImageView<const OtherPixel> off) const;
+   * where both cameras see a period. */
+  std::optional<Shift> largest (const GreyView &on, const GreyView &off) const;
 
 private:
   struct Part {
     Position middle;
     std::vector<Position> on, off; ///< places of its mirrors, row after row
   };
-  struct Picture;
 
-  template <typename Pixel>
-  Picture picture (ImageView<const Pixel> frame,
+  Image<float> picture (const GreyView &frame,
       const std::vector<Position> &places, double white) const;
   std::optional<Shift> shift (
-      const Picture &on, const Picture &off, Position middle) const;
+      const Image<float> &on, const Image<float> &off, Position middle) const;
 
   Extent part_;   ///< its mirrors
   Extent period_; ///< a window of this size holds each label once

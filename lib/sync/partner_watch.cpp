@@ -143,17 +143,15 @@ PartnerWatch::PartnerWatch (
   expected_ratio_ = light_on / (light_all - light_on);
 }
 
-template <typename Pixel>
 PartnerWatch::Light
-PartnerWatch::read (const View &view, ImageView<const Pixel> frame) const
+PartnerWatch::read (const View &view, const GreyView &frame) const
 {
   Light light;
   light.levels.reserve (view.places.size ());
-  for (const Position place : view.places) {
-    const double level = bilinear (frame, place);
+  each_level (frame, view.places, [&] (double level) {
     light.levels.push_back (level < view.white ? float (level) : kNone);
     light.sum += level - view.black;
-  }
+  });
   for (std::size_t i = 0; i < light.levels.size (); i += size_)
     for (std::size_t at = 0; at < smooth_.size (); at += size_)
       subtract (&light.levels[i], &smooth_[at],
@@ -223,9 +221,8 @@ PartnerWatch::keep (std::deque<Light> &before, Light light)
     before.pop_front ();
 }
 
-template <typename Pixel, typename OtherPixel>
 PartnerWatch::Verdict
-PartnerWatch::take (ImageView<const Pixel> on, ImageView<const OtherPixel> off)
+PartnerWatch::take (const GreyView &on, const GreyView &off)
 {
   Pair now{read (on_, on), read (off_, off)};
   double worst = -std::numeric_limits<double>::infinity ();
@@ -249,23 +246,11 @@ PartnerWatch::take (ImageView<const Pixel> on, ImageView<const OtherPixel> off)
   return Verdict::good;
 }
 
-template <typename Pixel>
 void
-PartnerWatch::take_alone (ImageView<const Pixel> frame, bool off)
+PartnerWatch::take_alone (const GreyView &frame, bool off)
 {
   keep (off ? before_off_ : before_on_, read (off ? off_ : on_, frame));
   new_pairs_ = int (kBefore);
 }
-
-template void PartnerWatch::take_alone (ImageView<const std::uint8_t>, bool);
-template void PartnerWatch::take_alone (ImageView<const std::uint16_t>, bool);
-template PartnerWatch::Verdict PartnerWatch::take (
-    ImageView<const std::uint8_t>, ImageView<const std::uint8_t>);
-template PartnerWatch::Verdict PartnerWatch::take (
-    ImageView<const std::uint16_t>, ImageView<const std::uint16_t>);
-template PartnerWatch::Verdict PartnerWatch::take (
-    ImageView<const std::uint8_t>, ImageView<const std::uint16_t>);
-template PartnerWatch::Verdict PartnerWatch::take (
-    ImageView<const std::uint16_t>, ImageView<const std::uint8_t>);
 
 } // namespace codedexposure

@@ -49,13 +49,11 @@ public:
   PartnerWatch (const Schedule &schedule, const Camera &on, const Camera &off);
 
   /** Compares, and keeps both for the next pair. The views have the cameras'
-   * sizes; for 8 and 16 bits. */
-  template <typename Pixel, typename OtherPixel>
-  Verdict take (ImageView<const Pixel> on, ImageView<const OtherPixel> off);
+   * sizes. */
+  Verdict take (const GreyView &on, const GreyView &off);
   /** Keeps a frame that has no partner, of the beam of the mirrors that are
    * @p off or on. */
-  template <typename Pixel>
-  void take_alone (ImageView<const Pixel> frame, bool off);
+  void take_alone (const GreyView &frame, bool off);
   /** The next pair has none before it. */
   void reset ()
   {
@@ -80,8 +78,7 @@ private:
     Light on = {}, off = {};
   };
 
-  template <typename Pixel>
-  Light read (const View &view, ImageView<const Pixel> frame) const;
+  Light read (const View &view, const GreyView &frame) const;
   static void keep (std::deque<Light> &before, Light light);
   double gain_of (const Pair &pair) const;
   double unevenness_of (const Pair &pair) const;

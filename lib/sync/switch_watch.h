@@ -3,25 +3,9 @@
 #pragma once
 
 #include <algorithm>
-#include <cstdint>
-#include <numeric>
-
-#include "base/image.h"
 
 namespace codedexposure
 {
-
-/** Mean of all pixels, which are not none. */
-template <typename Pixel>
-double
-mean_level (ImageView<const Pixel> frame)
-{
-  double sum = 0.0;
-  for (int y = 0; y < frame.height; y++)
-    sum += double (std::accumulate (
-        frame.row (y), frame.row (y) + frame.width, std::uint64_t (0)));
-  return sum / (double (frame.width) * frame.height);
-}
 
 /**
  * Before it shows something else, a DMD leaves one exposure dark, or without a
@@ -54,7 +38,7 @@ public:
   /**
    * Whether a frame shows the new mask.
    * @p done   the device reports the switch.
-   * @p level  mean_level () of the frame.
+   * @p level  mean of the frame.
    * @p gap    frames are missing before this one.
    */
   bool take (bool done, double level, bool gap)

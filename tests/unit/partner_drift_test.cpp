@@ -57,8 +57,7 @@ largest (const Frames &both, Shift shift)
 {
   const PartnerDrift drift (both.schedule, kAligned, kAligned);
   const auto off = moved (both.off, shift);
-  return drift.largest<std::uint8_t, std::uint8_t> (
-      both.on.view (), off.view ());
+  return drift.largest (both.on.view (), off.view ());
 }
 
 auto
@@ -146,8 +145,7 @@ TEST (PartnerDrift, IsNotKnownWithoutTexture)
   const PartnerDrift tiny (schedule_of ("sequential:lattice:8/3"),
       {{16, 12}, nullptr}, {{16, 12}, nullptr});
   const Image<std::uint8_t> dark (16, 12);
-  EXPECT_FALSE (
-      (tiny.largest<std::uint8_t, std::uint8_t> (dark.view (), dark.view ())));
+  EXPECT_FALSE (tiny.largest (dark.view (), dark.view ()));
 }
 
 /* It is left out. */

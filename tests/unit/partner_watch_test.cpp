@@ -49,8 +49,7 @@ verdicts (const Beams &beams, int shift, PartnerWatch watch)
   std::map<Verdict, int> count;
   for (int i = 0; i < kFrames; i++)
     if (i + shift >= 0 && i + shift < kFrames)
-      count[watch.take<std::uint8_t, std::uint8_t> (
-          beams.on[std::size_t (i)].view (),
+      count[watch.take (beams.on[std::size_t (i)].view (),
           beams.off[std::size_t (i + shift)].view ())]++;
   return count;
 }
@@ -58,7 +57,7 @@ verdicts (const Beams &beams, int shift, PartnerWatch watch)
 Verdict
 take (PartnerWatch &watch, const Beams &beams, int on, int off)
 {
-  return watch.take<std::uint8_t, std::uint8_t> (
+  return watch.take (
       beams.on[std::size_t (on)].view (), beams.off[std::size_t (off)].view ());
 }
 
@@ -166,8 +165,7 @@ TEST (PartnerWatch, BeginsAnewAfterAReset)
   const Beams both = beams (kPreset, 0.7);
   PartnerWatch watch = watch_of (both);
   const auto take = [&] (std::size_t on, std::size_t off) {
-    return watch.take<std::uint8_t, std::uint8_t> (
-        both.on[on].view (), both.off[off].view ());
+    return watch.take (both.on[on].view (), both.off[off].view ());
   };
   take (0, 0);
   EXPECT_EQ (take (1, 1), Verdict::good);
@@ -190,7 +188,7 @@ TEST (PartnerWatch, AFrameAloneIsComparedWith)
     PartnerWatch watch (seen.schedule, camera, camera);
     for (int i = 0; i < 6; i++)
       take (watch, seen, i, i);
-    watch.take_alone<std::uint8_t> (seen.on[6].view (), false);
+    watch.take_alone (seen.on[6].view (), false);
     EXPECT_EQ (take (watch, seen, on, off), verdict) << "partner " << off;
   }
 }
@@ -203,7 +201,7 @@ TEST (PartnerWatch, AFrameAloneOfAStillSceneRefusesNone)
   PartnerWatch watch (seen.schedule, camera, camera);
   for (int i = 0; i < 6; i++)
     take (watch, seen, i, i);
-  watch.take_alone<std::uint8_t> (seen.off[6].view (), true);
+  watch.take_alone (seen.off[6].view (), true);
   for (int i = 7; i < 10; i++)
     EXPECT_EQ (take (watch, seen, i, i), Verdict::unknown);
 }

@@ -58,11 +58,7 @@ public:
         gst_bus_pop_filtered (bus.get (), GST_MESSAGE_ERROR));
     if (!message)
       return std::nullopt;
-    GError *error = nullptr;
-    gst_message_parse_error (message.get (), &error, nullptr);
-    std::string text = error->message;
-    g_error_free (error);
-    return text;
+    return Told (message.get ()).error->message;
   }
   /** How the pictures were made, among others. */
   std::vector<EventPtr> tags () const

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "pipeline/messages.h"
+
 namespace codedexposure::app
 {
 
@@ -66,11 +68,7 @@ FrameSource::why_ended () const
       gst_bus_pop_filtered (bus.get (), GST_MESSAGE_ERROR));
   if (!message)
     return "the scene has ended";
-  GError *error = nullptr;
-  gst_message_parse_error (message.get (), &error, nullptr);
-  std::string text = error->message;
-  g_error_free (error);
-  return text;
+  return Told (message.get ()).error->message;
 }
 
 } // namespace codedexposure::app

@@ -16,16 +16,6 @@ namespace
 /* The longest name and length. */
 constexpr std::size_t kHeader = 12;
 
-Source
-source_of (std::string_view bytes)
-{
-  return {[bytes] (std::uint64_t at, std::size_t length) {
-            return std::string (bytes.substr (
-                std::min (std::size_t (at), bytes.size ()), length));
-          },
-      bytes.size ()};
-}
-
 } // namespace
 
 void
@@ -61,7 +51,7 @@ ClusterGate::find_cluster (std::string &head)
 ClusterGate::Found
 ClusterGate::look_into (std::size_t data, std::size_t end) const
 {
-  Source source = source_of (held_);
+  Source source = Source::of (held_);
   std::uint64_t at = data;
   while (at < end) {
     if (held_.size () < std::min<std::uint64_t> (at + kHeader, end))
@@ -79,7 +69,7 @@ ClusterGate::look_into (std::size_t data, std::size_t end) const
 ClusterGate::Found
 ClusterGate::look (std::size_t &size)
 {
-  Source source = source_of (held_);
+  Source source = Source::of (held_);
   const auto element = source.element_at (at_, kUnlimited);
   if (!element)
     return held_.size () - at_ < kHeader ? Found::part : Found::damaged;

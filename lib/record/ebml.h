@@ -66,6 +66,16 @@ public:
   {
   }
 
+  /** Of @p bytes, which outlive it. */
+  static Source of (std::string_view bytes)
+  {
+    return {[bytes] (std::uint64_t at, std::size_t length) {
+              return std::string (bytes.substr (
+                  std::min (std::size_t (at), bytes.size ()), length));
+            },
+        bytes.size ()};
+  }
+
   std::uint64_t size () const { return size_; }
 
   /** Valid until the next call; shorter at the end of the file. */

@@ -315,12 +315,7 @@ read_at (int file, std::uint64_t at, std::size_t length)
 std::optional<MatroskaHead>
 matroska_head (std::string_view bytes)
 {
-  Source file (
-      [bytes] (std::uint64_t at, std::size_t length) {
-        return std::string (bytes.substr (
-            std::size_t (std::min<std::uint64_t> (at, bytes.size ())), length));
-      },
-      bytes.size ());
+  Source file = Source::of (bytes);
   const auto segment = segment_of (file);
   return segment ? head_of (file, *segment) : std::nullopt;
 }

@@ -25,44 +25,29 @@ namespace
 
 constexpr std::uint8_t kOut = 0x01, kIn = 0x81;
 
-/** A reference to memory of the program under test. */
-class Reference
-{
-public:
-  Reference () = default;
-  explicit Reference (UMockdevIoctlData *data) : data_ (data) {}
-  Reference (Reference &&other) noexcept
-      : data_ (std::exchange (other.data_, nullptr))
+struct DataUnref {
+  void operator() (UMockdevIoctlData *data) const
   {
+    umockdev_ioctl_data_unref (data);
   }
-  Reference &operator= (Reference &&other) noexcept
-  {
-    std::swap (data_, other.data_);
-    return *this;
-  }
-  ~Reference ()
-  {
-    if (data_ != nullptr)
-      umockdev_ioctl_data_unref (data_);
-  }
-
-  /** The memory behind the pointer at @p offset. */
-  Reference resolve (std::size_t offset, std::size_t size) const
-  {
-    return Reference (
-        umockdev_ioctl_data_resolve (data_, offset, size, nullptr));
-  }
-  UMockdevIoctlData *get () const { return data_; }
-  template <typename T>
-  T *as () const
-  {
-    return reinterpret_cast<T *> (data_->data);
-  }
-  explicit operator bool () const { return data_ != nullptr; }
-
-private:
-  UMockdevIoctlData *data_ = nullptr;
 };
+/** A reference to memory of the program under test. */
+using Reference = std::unique_ptr<UMockdevIoctlData, DataUnref>;
+
+/** The memory behind the pointer at @p offset of @p data; null: the program was
+ * killed meanwhile. */
+Reference
+resolve (UMockdevIoctlData *data, std::size_t offset, std::size_t size)
+{
+  return Reference (umockdev_ioctl_data_resolve (data, offset, size, nullptr));
+}
+
+template <typename T>
+T *
+as (const Reference &memory)
+{
+  return reinterpret_cast<T *> (memory->data);
+}
 
 struct Unref {
   void operator() (gpointer object) const { g_object_unref (object); }
@@ -126,10 +111,9 @@ descriptors (std::uint16_t product)
 class UsbPort
 {
 public:
-  UsbPort (std::uint16_t product, std::string serial,
-      std::shared_ptr<EmulatedHid> board)
-      : descriptors_ (descriptors (product)), serial_ (std::move (serial)),
-        board_ (std::move (board)), handler_ (umockdev_ioctl_base_new ())
+  UsbPort (std::string serial, std::shared_ptr<EmulatedHid> board)
+      : serial_ (std::move (serial)), board_ (std::move (board)),
+        handler_ (umockdev_ioctl_base_new ())
   {
     g_signal_connect_after (
         handler_, "handle-ioctl", G_CALLBACK (on_ioctl), this);
@@ -143,10 +127,6 @@ public:
   }
 
   UMockdevIoctlBase *handler () const { return handler_; }
-  const std::vector<std::uint8_t> &all_descriptors () const
-  {
-    return descriptors_;
-  }
   std::string sys_path, node;
 
   void pull ()
@@ -200,7 +180,7 @@ private:
     Reference urb, buffer;
     gulong address = 0;
     int sent = 0;
-    usbdevfs_urb *get () const { return urb.as<usbdevfs_urb> (); }
+    usbdevfs_urb *get () const { return as<usbdevfs_urb> (urb); }
   };
 
   static gboolean on_ioctl (
@@ -241,9 +221,8 @@ private:
       drop_all (-ENODEV);
     switch (request) {
     case USBDEVFS_GET_CAPABILITIES: {
-      const Reference value (umockdev_ioctl_data_resolve (
-          argument (), 0, sizeof (std::uint32_t), nullptr));
-      *value.as<std::uint32_t> () = USBDEVFS_CAP_REAP_AFTER_DISCONNECT;
+      const Reference value = resolve (argument (), 0, sizeof (std::uint32_t));
+      *as<std::uint32_t> (value) = USBDEVFS_CAP_REAP_AFTER_DISCONNECT;
       return 0;
     }
     case USBDEVFS_REAPURBNDELAY:
@@ -271,15 +250,14 @@ private:
     case USBDEVFS_GETDRIVER: {
       if (!bound_)
         return fail (error, ENODATA);
-      const Reference value (umockdev_ioctl_data_resolve (
-          argument, 0, sizeof (usbdevfs_getdriver), nullptr));
-      std::strcpy (value.as<usbdevfs_getdriver> ()->driver, "usbhid");
+      const Reference value =
+          resolve (argument, 0, sizeof (usbdevfs_getdriver));
+      std::strcpy (as<usbdevfs_getdriver> (value)->driver, "usbhid");
       return 0;
     }
     case USBDEVFS_IOCTL: {
-      const Reference value (umockdev_ioctl_data_resolve (
-          argument, 0, sizeof (usbdevfs_ioctl), nullptr));
-      const auto code = std::uint32_t (value.as<usbdevfs_ioctl> ()->ioctl_code);
+      const Reference value = resolve (argument, 0, sizeof (usbdevfs_ioctl));
+      const auto code = std::uint32_t (as<usbdevfs_ioctl> (value)->ioctl_code);
       if (code == USBDEVFS_DISCONNECT && !bound_)
         return fail (error, ENODATA);
       bound_ = code == USBDEVFS_CONNECT;
@@ -307,15 +285,14 @@ private:
   {
     Urb urb;
     urb.owner = std::make_unique<Owner> (client);
-    urb.urb = Reference (umockdev_ioctl_data_resolve (
-        argument, 0, sizeof (usbdevfs_urb), nullptr));
+    urb.urb = resolve (argument, 0, sizeof (usbdevfs_urb));
     if (!urb.urb.get ())
       return fail (error, EFAULT); // killed in the middle
     urb.address = urb.urb.get ()->client_addr;
     const int length = urb.get ()->buffer_length;
     if (length > 0)
-      urb.buffer = urb.urb.resolve (
-          offsetof (usbdevfs_urb, buffer), std::size_t (length));
+      urb.buffer = resolve (urb.urb.get (), offsetof (usbdevfs_urb, buffer),
+          std::size_t (length));
     if (length > 0 && !urb.buffer.get ())
       return fail (error, EFAULT);
     if (urb.get ()->type == USBDEVFS_URB_TYPE_CONTROL)
@@ -337,7 +314,7 @@ private:
 
   void finish_out (Urb urb)
   {
-    const auto *bytes = urb.buffer.as<const std::uint8_t> ();
+    const auto *bytes = as<const std::uint8_t> (urb.buffer);
     const int length = urb.get ()->buffer_length;
     int sent = 0;
     while (sent < length && board_->out ({bytes + sent, bytes + sent + 64}))
@@ -360,7 +337,7 @@ private:
       Urb urb = std::move (waiting_.front ());
       waiting_.erase (waiting_.begin ());
       std::memcpy (
-          urb.buffer.as<std::uint8_t> (), packet->data (), packet->size ());
+          as<std::uint8_t> (urb.buffer), packet->data (), packet->size ());
       finish (std::move (urb), 0, int (packet->size ()));
     }
   }
@@ -369,7 +346,7 @@ private:
   void finish_control (Urb urb)
   {
     constexpr int kSetup = 8;
-    auto *bytes = urb.buffer.as<std::uint8_t> ();
+    auto *bytes = as<std::uint8_t> (urb.buffer);
     const bool string = bytes[1] == 6 && bytes[3] == 3;
     std::vector<std::uint8_t> answer{4, 3, 9, 4}; // US English
     if (bytes[2] != 0) {
@@ -393,8 +370,7 @@ private:
       return fail (error, board_->gone () ? ENODEV : EAGAIN);
     const Urb urb = std::move (*found);
     done_.erase (found);
-    const Reference slot (
-        umockdev_ioctl_data_resolve (argument, 0, sizeof (gpointer), nullptr));
+    const Reference slot = resolve (argument, 0, sizeof (gpointer));
     if (!slot.get ())
       return fail (error, EFAULT);
     umockdev_ioctl_data_set_ptr (slot.get (), 0, urb.urb.get ());
@@ -434,7 +410,6 @@ private:
     }
   }
 
-  const std::vector<std::uint8_t> descriptors_;
   const std::string serial_;
   const std::shared_ptr<EmulatedHid> board_;
   UMockdevIoctlBase *const handler_;
@@ -464,12 +439,12 @@ void
 UsbBed::plug (const std::string &port, std::uint16_t product,
     const std::string &serial, std::shared_ptr<EmulatedHid> board)
 {
-  auto made = std::make_unique<UsbPort> (product, serial, std::move (board));
+  auto made = std::make_unique<UsbPort> (serial, std::move (board));
   const std::string number = "00" + port.substr (port.find ('-') + 1);
   made->node = "/dev/bus/usb/001/" + number;
   made->sys_path = "/sys/devices/usb1/" + port;
   std::string hex;
-  for (const std::uint8_t byte : made->all_descriptors ()) {
+  for (const std::uint8_t byte : descriptors (product)) {
     char text[3];
     std::snprintf (text, sizeof text, "%02x", byte);
     hex += text;

@@ -77,27 +77,27 @@ line_selector ()
       "<Integer Name=\"" + name + "Value\"><Value>0</Value></Integer>\n");
 }
 
+/* @p index of the address, if there is one. */
+std::string
+int_reg (
+    const std::string &name, guint32 address, const std::string &index = "")
+{
+  return "<IntReg Name=\"" + name + "\"><Address>" + std::to_string (address) +
+         "</Address>" + index +
+         "<Length>4</Length><AccessMode>RW</AccessMode>"
+         "<pPort>Device</pPort><Sign>Unsigned</Sign>"
+         "<Endianess>BigEndian</Endianess></IntReg>\n";
+}
+
 /* An enumeration for each line, in registers from @p address on. */
 std::string
 line_choice (const std::string &name, const std::vector<std::string> &values,
     guint32 address)
 {
   return choice (name, values,
-      "<IntReg Name=\"" + name + "Value\"><Address>" +
-          std::to_string (address) + "</Address><pIndex Offset=\"" +
-          std::to_string (kNextLine) + "\">" + kSelector +
-          "Value</pIndex><Length>4</Length><AccessMode>RW</AccessMode>"
-          "<pPort>Device</pPort><Sign>Unsigned</Sign>"
-          "<Endianess>BigEndian</Endianess></IntReg>\n");
-}
-
-std::string
-int_reg (const std::string &name, guint32 address)
-{
-  return "<IntReg Name=\"" + name + "\"><Address>" + std::to_string (address) +
-         "</Address><Length>4</Length><AccessMode>RW</AccessMode>"
-         "<pPort>Device</pPort><Sign>Unsigned</Sign>"
-         "<Endianess>BigEndian</Endianess></IntReg>\n";
+      int_reg (name + "Value", address,
+          "<pIndex Offset=\"" + std::to_string (kNextLine) + "\">" + kSelector +
+              "Value</pIndex>"));
 }
 
 /* A number with a fraction, in the register @address. */

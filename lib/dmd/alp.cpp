@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/try.h"
+#include "dmd/bitmap.h"
 
 namespace codedexposure
 {
@@ -143,13 +144,8 @@ void
 append_bit_plane (Bytes &planes, const MirrorRows<std::uint8_t> &mirrors)
 {
   const auto row_bytes = std::size_t (mirrors.width () + 7) / 8;
-  for (int y = 0; y < mirrors.height (); y++) {
-    const std::size_t start = planes.size ();
-    planes.resize (start + row_bytes);
-    for (int x = 0; x < mirrors.width (); x++)
-      if (mirrors.row (y)[x] != 0)
-        planes[start + std::size_t (x / 8)] |= std::uint8_t (0x80 >> x % 8);
-  }
+  for (int y = 0; y < mirrors.height (); y++)
+    append_bits (planes, mirrors, y, row_bytes);
 }
 
 std::string

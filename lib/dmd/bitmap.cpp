@@ -22,41 +22,36 @@ headers (int width, int height, int bits, std::uint32_t colours)
   const auto pixels =
       std::uint32_t (row_size (width, bits) * std::size_t (height));
   const std::uint32_t start = kFile + kInfo + colours * kColour;
-  Bytes file{'B', 'M'};
+  constexpr int kLayers = 1, kNotCompressed = 0, kPixelsPerMetre = 0;
+  Bytes file = bytes_of ({{'B', 1}, {'M', 1}, {start + pixels, 4}, {0, 4},
+      {start, 4}, {kInfo, 4}, {width, 4}, {height, 4}, {kLayers, 2}, {bits, 2},
+      {kNotCompressed, 4}, {pixels, 4}, {kPixelsPerMetre, 4},
+      {kPixelsPerMetre, 4}, {colours, 4}, {0, 4}});
   file.reserve (start + pixels);
-  append_le (file, start + pixels, 4);
-  append_le (file, 0, 4);
-  append_le (file, start, 4);
-  append_le (file, kInfo, 4);
-  append_le (file, std::uint32_t (width), 4);
-  append_le (file, std::uint32_t (height), 4);
-  append_le (file, 1, 2); // layers
-  append_le (file, std::uint32_t (bits), 2);
-  append_le (file, 0, 4); // not compressed
-  append_le (file, pixels, 4);
-  append_le (file, 0, 4); // pixels a metre, along x and y
-  append_le (file, 0, 4);
-  append_le (file, colours, 4);
-  append_le (file, 0, 4);
   return file;
 }
 
 } // namespace
 
+void
+append_bits (Bytes &bytes, const MirrorRows<std::uint8_t> &mirrors, int row,
+    std::size_t size)
+{
+  const std::size_t start = bytes.size ();
+  bytes.resize (start + size);
+  const std::uint8_t *on = mirrors.row (row);
+  for (int x = 0; x < mirrors.width (); x++)
+    if (on[x] != 0)
+      bytes[start + std::size_t (x / 8)] |= std::uint8_t (0x80 >> x % 8);
+}
+
 Bytes
 encode_bitmap (const MirrorRows<std::uint8_t> &mirrors)
 {
   Bytes file = headers (mirrors.width (), mirrors.height (), 1, 2);
-  append_le (file, 0x000000, 4);
-  append_le (file, 0xFFFFFF, 4);
-  const std::size_t row_bytes = row_size (mirrors.width (), 1);
-  for (int y = mirrors.height () - 1; y >= 0; y--) {
-    const std::size_t start = file.size ();
-    file.resize (start + row_bytes);
-    for (int x = 0; x < mirrors.width (); x++)
-      if (mirrors.row (y)[x] != 0)
-        file[start + std::size_t (x / 8)] |= std::uint8_t (0x80 >> x % 8);
-  }
+  append (file, bytes_of ({{0x000000, 4}, {0xFFFFFF, 4}}));
+  for (int y = mirrors.height () - 1; y >= 0; y--)
+    append_bits (file, mirrors, y, row_size (mirrors.width (), 1));
   return file;
 }
 

@@ -8,6 +8,11 @@
 namespace codedexposure
 {
 
+/** Appends @p size bytes with a bit for each mirror of @p row, of which the
+ * highest bit of the first one is the left mirror, and zeros. */
+void append_bits (Bytes &bytes, const MirrorRows<std::uint8_t> &mirrors,
+    int row, std::size_t size);
+
 /** A binary mask, 1 bit a mirror, 1 is on. */
 Bytes encode_bitmap (const MirrorRows<std::uint8_t> &mirrors);
 

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <initializer_list>
 #include <span>
 #include <string>
 #include <vector>
@@ -20,6 +21,22 @@ append_le (Bytes &out, std::uint32_t value, int bytes)
 {
   for (int i = 0; i < bytes; i++)
     out.push_back (std::uint8_t (value >> (8 * i)));
+}
+
+/** A number, and how many of its bytes a message has. */
+struct Field {
+  std::int64_t value;
+  int bytes;
+};
+
+/** @p fields end to end. */
+inline Bytes
+bytes_of (std::initializer_list<Field> fields)
+{
+  Bytes out;
+  for (const auto &[value, bytes] : fields)
+    append_le (out, std::uint32_t (value), bytes);
+  return out;
 }
 
 inline void

@@ -32,10 +32,7 @@ encode_configuration (int entries, int per_trigger, int images)
 Bytes
 encode_times (const PatternTime &time)
 {
-  Bytes bytes;
-  append_le (bytes, time.exposure, 4);
-  append_le (bytes, time.exposure + time.dark, 4);
-  return bytes;
+  return bytes_of ({{time.exposure, 4}, {time.exposure + time.dark, 4}});
 }
 
 Bytes

@@ -2,7 +2,6 @@
 #include "dmd/dlpc900_protocol.h"
 
 #include <algorithm>
-#include <array>
 
 namespace codedexposure::dlpc900
 {
@@ -50,13 +49,11 @@ plain_pixels (const MirrorRows<PlanePixel> &image, int x, int width)
 Bytes
 image_header (Extent image, std::size_t size, std::uint8_t packing)
 {
-  Bytes header{'S', 'p', 'l', 'd'};
-  append_le (header, std::uint32_t (image.width), 2);
-  append_le (header, std::uint32_t (image.height), 2);
-  append_le (header, std::uint32_t (size), 4);
-  header.insert (header.end (), 8, 0xFF);
-  append_le (header, 0, 4); // background colour
-  append (header, std::array<std::uint8_t, 6>{1, packing, 1, 0, 0, 1});
+  constexpr std::uint32_t kUnused = 0xFFFFFFFF, kBlack = 0;
+  Bytes header = bytes_of ({{'S', 1}, {'p', 1}, {'l', 1}, {'d', 1},
+      {image.width, 2}, {image.height, 2}, {std::int64_t (size), 4},
+      {kUnused, 4}, {kUnused, 4}, {kBlack, 4}, {1, 1}, {packing, 1}, {1, 1},
+      {0, 2}, {1, 1}});
   header.resize (kHeaderSize);
   return header;
 }
@@ -68,27 +65,17 @@ encode_entry (const Entry &entry)
 {
   // One bit in white; the image is cleared after the exposure.
   constexpr unsigned kWhite = 7 << 4, kClear = 1;
-  Bytes bytes;
-  append_le (bytes, entry.index, 2);
-  append_le (bytes, entry.time.exposure, 3);
-  bytes.push_back (
-      std::uint8_t (kClear | kWhite | unsigned (entry.wait_for_trigger) << 7));
-  append_le (bytes, entry.time.dark, 3);
-  bytes.push_back (entry.trigger_out_2 ? 0 : 1); // the bit disables
-  append_le (bytes,
-      std::uint32_t (entry.plane.image) | std::uint32_t (entry.plane.plane)
-                                              << 11,
-      2);
-  return bytes;
+  return bytes_of ({{entry.index, 2}, {entry.time.exposure, 3},
+      {kClear | kWhite | unsigned (entry.wait_for_trigger) << 7, 1},
+      {entry.time.dark, 3}, {!entry.trigger_out_2, 1}, // the bit disables
+      {entry.plane.image | entry.plane.plane << 11, 2}});
 }
 
 Bytes
 encode_configuration (int entries)
 {
-  Bytes bytes;
-  append_le (bytes, std::uint32_t (entries), 2);
-  append_le (bytes, 0, 4); // patterns until it stops: no limit
-  return bytes;
+  constexpr int kNoLimit = 0; // patterns until it stops
+  return bytes_of ({{entries, 2}, {kNoLimit, 4}});
 }
 
 Bytes
@@ -103,19 +90,13 @@ encode_order (const std::vector<int> &order)
 Bytes
 encode_trigger_out (bool invert, int rising_us, int falling_us)
 {
-  Bytes bytes{std::uint8_t (invert)};
-  append_le (bytes, std::uint32_t (rising_us), 2);
-  append_le (bytes, std::uint32_t (falling_us), 2);
-  return bytes;
+  return bytes_of ({{invert, 1}, {rising_us, 2}, {falling_us, 2}});
 }
 
 Bytes
 encode_trigger_in (int delay_us, bool falling)
 {
-  Bytes bytes;
-  append_le (bytes, std::uint32_t (delay_us), 2);
-  bytes.push_back (falling ? 1 : 0);
-  return bytes;
+  return bytes_of ({{delay_us, 2}, {falling, 1}});
 }
 
 PiecedBytes
@@ -136,10 +117,7 @@ encode_image (const MirrorRows<PlanePixel> &image, int x, int width)
 Bytes
 encode_load (int index, std::size_t size)
 {
-  Bytes bytes;
-  append_le (bytes, std::uint32_t (index), 2);
-  append_le (bytes, std::uint32_t (size), 4);
-  return bytes;
+  return bytes_of ({{index, 2}, {std::int64_t (size), 4}});
 }
 
 Bytes

@@ -41,27 +41,17 @@ encode_message (PacketType type, std::uint16_t command, ByteView payload)
 Bytes
 encode_sequence (const Sequence &sequence, int bytes)
 {
-  const bool extended = bytes == 19;
-  Bytes data{1}; // bit
-  append_le (data, std::uint32_t (sequence.patterns), extended ? 2 : 1);
-  data.push_back (0); // no inverse patterns in between
-  data.push_back (std::uint8_t (sequence.trigger));
-  append_le (data, 0, 4); // delay
-  append_le (data, sequence.period, 4);
-  append_le (data, sequence.exposure, 4);
-  data.push_back (kGreen);
-  if (bytes > 17)
-    data.push_back (1); // repeat
-  return data;
+  constexpr int kBits = 1, kNoInverse = 0, kNoDelay = 0, kRepeat = 1;
+  return bytes_of ({{kBits, 1}, {sequence.patterns, bytes == 19 ? 2 : 1},
+      {kNoInverse, 1}, {std::int64_t (sequence.trigger), 1}, {kNoDelay, 4},
+      {sequence.period, 4}, {sequence.exposure, 4}, {kGreen, 1},
+      {kRepeat, bytes > 17 ? 1 : 0}});
 }
 
 Bytes
 encode_camera_trigger (bool enable, std::uint32_t pulse_us)
 {
-  Bytes data{std::uint8_t (enable), 0, 0};
-  append_le (data, 0, 4);
-  append_le (data, pulse_us, 4);
-  return data;
+  return bytes_of ({{enable, 1}, {0, 2}, {0, 4}, {pulse_us, 4}});
 }
 
 Result<PacketHead>

@@ -131,16 +131,11 @@ struct SimulatedCamera final : public GigeCamera {
   }
 
   CameraSettings settings ();
-  struct Taken {
-    std::uint64_t frame = 0;
-    Nanoseconds device_time = 0;
-    Fault fault = {};
-  };
 
   void set_features ();
   void tell_settings ();
   void tell_start (ArvBuffer *buffer);
-  std::optional<Taken> take ();
+  std::optional<SentFrame> take ();
   void send (ArvBuffer *buffer);
   void bend ();
   void set_loss (double part)
@@ -263,10 +258,10 @@ SimulatedCamera::obey (const Fault &fault, ArvBuffer *buffer, std::size_t size)
 }
 
 /* The next frame, its picture and what happens to it; none: there is none. */
-std::optional<SimulatedCamera::Taken>
+std::optional<SentFrame>
 SimulatedCamera::take ()
 {
-  Taken taken;
+  SentFrame taken{.host_time = monotonic_now ()};
   bool lost = false;
   if (options.shoot) {
     const auto shot = options.shoot (picture.view ());
@@ -303,35 +298,30 @@ SimulatedCamera::send (ArvBuffer *buffer)
 {
   tell_settings ();
   tell_start (buffer);
-  SentFrame sent;
-  sent.host_time = monotonic_now ();
-  const auto taken = take ();
-  if (!taken) {
+  const auto sent = take ();
+  if (!sent) {
     set_loss (1);
     return;
   }
-  sent.frame = taken->frame;
-  sent.fault = taken->fault;
-  sent.device_time = taken->device_time;
 
   const MonoFormat format =
       format_of (get_register (ARV_FAKE_CAMERA_REGISTER_PIXEL_FORMAT));
   /* The buffer does not know its size before it is received. */
   const std::size_t size = arv_fake_camera_get_payload (camera);
-  arv_buffer_set_timestamp (buffer, guint64 (sent.device_time));
+  arv_buffer_set_timestamp (buffer, guint64 (sent->device_time));
   /* Without a gap where the camera asked in vain. */
   if (options.shoot)
-    arv_buffer_set_frame_id (buffer, sent.frame % 65535 + 1);
-  if (options.shoot || expose (sent.frame, picture.view ())) {
+    arv_buffer_set_frame_id (buffer, sent->frame % 65535 + 1);
+  if (options.shoot || expose (sent->frame, picture.view ())) {
     bend ();
     take_light (format);
     pack (format, int (get_register (ARV_FAKE_CAMERA_REGISTER_WIDTH)),
         int (get_register (ARV_FAKE_CAMERA_REGISTER_HEIGHT)));
-    obey (sent.fault, buffer, size);
+    obey (sent->fault, buffer, size);
   } else
     set_loss (1);
   if (options.sent)
-    options.sent (sent);
+    options.sent (*sent);
 }
 
 /* Applies the camera's gamma. */

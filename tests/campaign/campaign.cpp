@@ -1,20 +1,17 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* The campaign: what is delivered under faults, compared with the truth.
  * docs/reliability.md */
-#include <fcntl.h>
 #include <sched.h>
 #include <sys/mount.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
-#include <cstring>
 #include <filesystem>
 
 #include <gst/gst.h>
 
-#include "own_network.h"
+#include "emulation/own_network.h"
 #include "row.h"
 
 namespace codedexposure::campaign
@@ -30,21 +27,7 @@ bool isolated = false;
 bool
 isolate ()
 {
-  const auto write = [] (const char *path, const std::string &text) {
-    const int file = open (path, O_WRONLY | O_CLOEXEC);
-    const bool done = file >= 0 && ::write (file, text.data (), text.size ()) ==
-                                       ssize_t (text.size ());
-    close (file);
-    return done;
-  };
-  const uid_t user = geteuid ();
-  if (user != 0) {
-    if (unshare (CLONE_NEWUSER) != 0)
-      return false;
-    write ("/proc/self/setgroups", "deny");
-    write ("/proc/self/uid_map", "0 " + std::to_string (user) + " 1");
-  }
-  return test::enter_own_network () && unshare (CLONE_NEWNS) == 0 &&
+  return leave_network (2).ok () && unshare (CLONE_NEWNS) == 0 &&
          mount (nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0;
 }
 

@@ -5,12 +5,12 @@
 #include <gst/gst.h>
 #include <gtest/gtest.h>
 
-#include "own_network.h"
+#include "emulation/own_network.h"
 
 int
 main (int argc, char **argv)
 {
-  const bool alone = codedexposure::test::enter_own_network ();
+  const bool alone = codedexposure::leave_network (2).ok ();
   gst_init (&argc, &argv);
   ::testing::InitGoogleTest (&argc, argv);
   if (!alone) {

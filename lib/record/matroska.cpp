@@ -4,10 +4,11 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdint>
+#include <cstdio>
 #include <cstring>
+#include <memory>
 #include <utility>
 
-#include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -280,26 +281,6 @@ read_blocks (Source &file, const Element &segment, RecordingInfo &info)
       info.recorded = line->end;
 }
 
-class FileNumber
-{
-public:
-  explicit FileNumber (const std::string &path)
-      : number_ (open (path.c_str (), O_RDONLY | O_CLOEXEC))
-  {
-  }
-  ~FileNumber ()
-  {
-    if (number_ >= 0)
-      close (number_);
-  }
-  FileNumber (const FileNumber &) = delete;
-  FileNumber &operator= (const FileNumber &) = delete;
-  operator int () const { return number_; }
-
-private:
-  const int number_;
-};
-
 std::string
 read_at (int file, std::uint64_t at, std::size_t length)
 {
@@ -330,11 +311,12 @@ recording_info (const std::string &path, bool with_frames)
   if (stat (path.c_str (), &status) != 0 || !S_ISREG (status.st_mode))
     return Error{"cannot read " + path + "; give the name of a recording",
         ErrorCode::io};
-  const FileNumber number (path);
-  if (number < 0)
+  const std::unique_ptr<std::FILE, int (*) (std::FILE *)> opened (
+      std::fopen (path.c_str (), "rbe"), std::fclose);
+  if (!opened)
     return Error{
         "cannot read " + path + ": " + std::strerror (errno), ErrorCode::io};
-  Source file ([&number] (std::uint64_t at,
+  Source file ([number = fileno (opened.get ())] (std::uint64_t at,
                    std::size_t length) { return read_at (number, at, length); },
       std::uint64_t (status.st_size));
   if (file.bytes (0, 4) != "\x1a\x45\xdf\xa3")

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "sync/rate_watch.h"
 
-#include <algorithm>
 #include <cmath>
 #include <utility>
+
+#include "base/statistics.h"
 
 namespace codedexposure
 {
@@ -18,13 +19,11 @@ constexpr std::size_t kSteps = 64;
 double
 usual_step (std::vector<Nanoseconds> steps)
 {
-  const auto middle = steps.begin () + std::ptrdiff_t (steps.size () / 2);
-  std::nth_element (steps.begin (), middle, steps.end ());
-  const auto median = double (*middle);
+  const auto middle = double (median (steps));
   double sum = 0;
   int count = 0;
   for (const Nanoseconds step : steps)
-    if (std::abs (double (step) - median) <= median / 2) {
+    if (std::abs (double (step) - middle) <= middle / 2) {
       sum += double (step);
       count++;
     }

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "emulation/fault_plan.h"
 
+#include <algorithm>
+#include <iterator>
 #include <string>
 
 #include "base/text.h"
@@ -14,7 +16,7 @@ namespace
 constexpr int kMaxFrames = 1'000'000;
 
 struct Named {
-  std::string_view name;
+  const char *name;
   Fault::Kind kind;
   bool counts; // MORE is a number of frames
 };
@@ -55,7 +57,7 @@ parse_word (std::string_view text, std::uint64_t now)
   const std::string_view rest = more ? text.substr (colon + 1) : "";
 
   for (const Named &kind : kKinds) {
-    if (kind.name != text.substr (0, at))
+    if (text.substr (0, at) != kind.name)
       continue;
     Word word;
     word.fault.kind = kind.kind;
@@ -80,6 +82,13 @@ parse_word (std::string_view text, std::uint64_t now)
 }
 
 } // namespace
+
+const char *
+fault_text (Fault::Kind kind)
+{
+  const auto *named = std::ranges::find (kKinds, kind, &Named::kind);
+  return named == std::end (kKinds) ? "sent" : named->name;
+}
 
 Result<void>
 FaultPlan::add (std::string_view text, std::uint64_t now)

@@ -28,6 +28,9 @@ struct Fault {
   Nanoseconds delay = 0;
 };
 
+/** As in a FaultPlan, "lose"; "sent": none. */
+const char *fault_text (Fault::Kind kind);
+
 /**
  * Faults by the number of their frame, from a text of words KIND@FRAME[:MORE]:
  *

@@ -14,10 +14,6 @@ namespace codedexposure::genicam
 namespace
 {
 
-struct Unref {
-  void operator() (gpointer object) const { g_object_unref (object); }
-};
-
 struct WireFormat {
   MonoFormat format;
   ArvPixelFormat code;

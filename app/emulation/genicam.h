@@ -14,6 +14,10 @@
 namespace codedexposure::genicam
 {
 
+struct Unref {
+  void operator() (gpointer object) const { g_object_unref (object); }
+};
+
 /** Register in which a client enables the trigger. */
 constexpr guint32 kTriggerMode = 0x400;
 /** Registers of the lines, one after the other. */

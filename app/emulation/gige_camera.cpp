@@ -28,21 +28,6 @@ namespace codedexposure
 
 using namespace genicam;
 
-namespace
-{
-
-struct Unref {
-  void operator() (gpointer object) const { g_object_unref (object); }
-};
-
-Nanoseconds
-monotonic_now ()
-{
-  return g_get_monotonic_time () * 1000;
-}
-
-} // namespace
-
 std::string
 camera_settings_text (const CameraSettings &settings)
 {
@@ -71,6 +56,12 @@ camera_settings_text (const CameraSettings &settings)
 
 namespace
 {
+
+Nanoseconds
+monotonic_now ()
+{
+  return g_get_monotonic_time () * 1000;
+}
 
 struct SimulatedCamera final : public GigeCamera {
   ~SimulatedCamera () override;

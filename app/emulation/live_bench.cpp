@@ -42,12 +42,11 @@ program_of (const emulated::EmulatedDlpc900 &board)
 Result<std::unique_ptr<LiveBench>>
 LiveBench::make (SickBenchOptions options, int kind)
 {
-  const emulated::EmulatedDlpc900 like (kind);
   auto board = std::make_shared<emulated::EmulatedDlpc900> (kind);
   const auto began = steady_clock::now ();
   const auto open =
       [&] (SickBenchOptions of) -> Result<std::unique_ptr<LiveBench>> {
-    of.mirrors = like.size ();
+    of.mirrors = board->size ();
     if (!of.has ("mute"))
       of.gamma = 1.0; // a camera's own feature
     ASSIGN_OR_RETURN (SickBench bench, SickBench::make (of));

@@ -22,14 +22,6 @@ namespace codedexposure
 namespace
 {
 
-const char *
-fault_text (Fault::Kind kind)
-{
-  static constexpr const char *names[] = {
-      "sent", "lose", "incomplete", "delay", "duplicate", "late", "stop"};
-  return names[int (kind)];
-}
-
 /* Words with '@' are faults of frames; the others are of the bench. */
 Result<SickBenchOptions>
 bench_of (const std::string &faults, Extent size,

@@ -37,17 +37,8 @@ namespace
 /** A frame, or a serialised event that came after one that waits. */
 using Item = std::variant<BufferPtr, EventPtr>;
 
-struct RestoreState {
-  explicit RestoreState (GstElement *element = nullptr) : damage (element) {}
-
-  GstPad *sink = nullptr, *src = nullptr; ///< the element's
-  guint64 tick = 1; ///< object lock; to which the container rounds times, ns
-
-  TrackSink track;
-  PartnerInput partners;
-  DamageReport damage;
-
-  /* Stream lock of the sink pad. */
+/** What is forgotten before a run. Stream lock of the sink pad. */
+struct Run {
   GstVideoInfo info = {};
   bool encoded = false; ///< there are no pixels to be checked
   GstSegment segment = {};
@@ -66,6 +57,16 @@ struct RestoreState {
   bool said_no_track = false;
   bool said_moved = false;
   bool said_setups_differ = false;
+};
+
+struct RestoreState : Run {
+  explicit RestoreState (GstElement *element = nullptr) : damage (element) {}
+
+  GstPad *sink = nullptr, *src = nullptr; ///< the element's
+  guint64 tick = 1; ///< object lock; to which the container rounds times, ns
+  TrackSink track;
+  PartnerInput partners;
+  DamageReport damage;
 };
 
 struct GstCodedExposureRestore : Instance<GstElement, RestoreState> {
@@ -122,9 +123,11 @@ note_setups (
   state.container = last;
   state.container->track = false;
   state.others = setups_from_tags (tags);
-  state.track.know (*state.container);
-  for (const StreamSetup &other : state.others)
-    state.track.know (other);
+  state.track.read ([&state] (TrackReader &reader) {
+    reader.know (*state.container);
+    for (const StreamSetup &other : state.others)
+      reader.know (other);
+  });
 }
 
 /* With a track, tags pass without their setup, which the track has. */
@@ -299,8 +302,10 @@ check_end (Self *self)
     say_no_track (self);
   if (!state.track.is_linked () || !state.is_complete)
     return;
-  const auto [rest, frames] =
-      state.track.take_rest (Nanoseconds (state.segment.start));
+  const auto [rest, frames] = state.track.read ([&state] (TrackReader &reader) {
+    auto match = reader.take_rest (Nanoseconds (state.segment.start));
+    return std::pair (std::move (match), reader.frames ());
+  });
   if (!frames && !state.whole && ends_early (state.sink, state.segment))
     return;
   report_missing (state, rest);
@@ -331,7 +336,8 @@ take_segment (Self *self, EventPtr event)
   state.segment_seqnum = gst_event_get_seqnum (event.get ());
   const auto order = order_of (state.segment);
   state.is_complete = order == TrackReader::Order::all;
-  state.track.next_segment (order);
+  state.track.read (
+      [order] (TrackReader &reader) { reader.next_segment (order); });
   if (!state.track.is_linked () || tick < 2)
     return event;
   include_rounding (state.segment, tick);
@@ -506,14 +512,8 @@ bool
 begin_run (GstElement *element)
 {
   RestoreState &state = state_in<Self> (element);
+  static_cast<Run &> (state) = {};
   forget_frames (state);
-  state.container.reset ();
-  state.others.clear ();
-  state.setup.reset ();
-  state.announced = state.found_line = false;
-  state.whole = true;
-  state.segment_seqnum = GST_SEQNUM_INVALID;
-  state.said_no_track = state.said_setups_differ = state.said_moved = false;
   state.track.restart ();
   state.partners.restart ();
   state.damage.restart ();

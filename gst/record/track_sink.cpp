@@ -109,34 +109,4 @@ TrackSink::restart ()
   reader_ = {};
 }
 
-void
-TrackSink::next_segment (TrackReader::Order order)
-{
-  const std::lock_guard lock (lock_);
-  reader_.next_segment (order);
-}
-
-void
-TrackSink::know (const StreamSetup &setup)
-{
-  const std::lock_guard lock (lock_);
-  reader_.know (setup);
-}
-
-std::optional<TrackReader::Match>
-TrackSink::take (Nanoseconds pts, Nanoseconds start, bool wait)
-{
-  const std::lock_guard lock (lock_);
-  if (wait)
-    return reader_.take (pts, start);
-  return reader_.take_now (pts, start);
-}
-
-TrackSink::Rest
-TrackSink::take_rest (Nanoseconds start)
-{
-  const std::lock_guard lock (lock_);
-  return {reader_.take_rest (start), reader_.frames ()};
-}
-
 } // namespace codedexposure::gst

@@ -37,21 +37,22 @@ public:
 
   /* Streaming thread of the frames: */
 
-  /** TrackReader::next_segment (). */
-  void next_segment (TrackReader::Order order);
-  /** TrackReader::know (). */
-  void know (const StreamSetup &setup);
+  /** What @p use returns of the reader, to which no line comes meanwhile. Never
+   * push inside. */
+  template <typename Use>
+  auto read (Use use)
+  {
+    return locked (lock_, [&] { return use (reader_); });
+  }
   /** TrackReader::take (), or take_now () if the line is not waited for: then
    * there always is a match. */
   std::optional<TrackReader::Match> take (
-      Nanoseconds pts, Nanoseconds start, bool wait);
-  struct Rest {
-    TrackReader::Match match;
-    /** In the whole stream, if its last line came. */
-    std::optional<std::uint64_t> frames;
-  };
-  /** TrackReader::take_rest (). */
-  Rest take_rest (Nanoseconds start);
+      Nanoseconds pts, Nanoseconds start, bool wait)
+  {
+    return read ([=] (TrackReader &reader) {
+      return wait ? reader.take (pts, start) : reader.take_now (pts, start);
+    });
+  }
 
 private:
   static GstFlowReturn chain (

@@ -134,12 +134,9 @@ reason_of (Alone alone)
 constexpr PartnerDrift::Shift kUnknown{
     {0.0, 0.0}, std::numeric_limits<double>::infinity (), {0.0, 0.0}};
 
-struct PairState {
-  /* Object lock: */
-  Counters counters;
-  PartnerDrift::Shift shift = kUnknown; ///< of the last pairs
-
-  /* Source pad's streaming thread, which also handles serialized events. */
+/* What is forgotten at the end of a run. Source pad's streaming thread, which
+ * also handles serialized events. */
+struct Run {
   std::optional<StreamSetup> on_setup, off_setup;
   std::vector<EventPtr> due; ///< before the next coded frame
   bool setup_due = false;
@@ -151,17 +148,12 @@ struct PairState {
   DriftWatch drift;
 
   void set_due () { setup_due = check_due = true; }
-  void reset ()
-  {
-    on_setup.reset ();
-    off_setup.reset ();
-    due.clear ();
-    setup_due = check_due = refused = false;
-    check = {};
-    alone = {};
-    refused_in_a_row = 0;
-    drift.reset ();
-  }
+};
+
+struct PairState : Run {
+  /* Object lock: */
+  Counters counters;
+  PartnerDrift::Shift shift = kUnknown; ///< of the last pairs
 };
 
 struct GstCodedExposurePair : Instance<GstAggregator, PairState> {
@@ -225,10 +217,7 @@ watch_drift (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
   if (!GST_CLOCK_TIME_IS_VALID (pts) || !st.drift.is_due (pts))
     return;
   st.drift.take (self, pts, st.check.drift (coded, partner));
-  locked (self, [&] {
-    st.shift = st.drift.median ().value_or (kUnknown);
-    return 0;
-  });
+  locked (self, [&] { st.shift = st.drift.median ().value_or (kUnknown); });
 }
 
 /* Why @coded goes on without @partner. */
@@ -271,7 +260,6 @@ count (GstCodedExposurePair *self, GstBuffer *coded, Alone alone)
     (reason ? counters.alone : counters.paired)++;
     counters.confirmed += alone == Alone::surely_not;
     counters.refused += alone == Alone::other_exposure;
-    return 0;
   });
   st.alone.add (self, GST_BUFFER_PTS (coded), reason);
   warn_if_out_of_step (self, alone);
@@ -497,10 +485,11 @@ flush (GstAggregator *aggregator)
 gboolean
 stop (GstAggregator *aggregator)
 {
-  state (aggregator).reset ();
+  PairState &st = state (aggregator);
+  static_cast<Run &> (st) = {};
   const ObjectLock lock (aggregator);
-  state (aggregator).counters = {};
-  state (aggregator).shift = kUnknown;
+  st.counters = {};
+  st.shift = kUnknown;
   return TRUE;
 }
 

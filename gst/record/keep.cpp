@@ -127,8 +127,8 @@ write_frames (GstCodedExposureKeep *self, KeptFrames frames)
       .frame = meta ? std::optional (meta->frame) : std::nullopt};
   const auto written = write_kept (std::move (frames),
       locked (self, [&] { return state.settings.location; }));
-  locked (state.mutex, [&] { return state.is_writing = false; });
-  locked (self, [&] { return state.recordings += written ? 1 : 0; });
+  locked (state.mutex, [&] { state.is_writing = false; });
+  locked (self, [&] { state.recordings += written ? 1 : 0; });
   if (written) {
     kept.location = *written;
     post_message (self, kept);
@@ -263,7 +263,6 @@ transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
     state.frames.buffers.push_back (std::move (kept));
     state.frames.bytes += bytes_of (frame);
     state.frames.limit (state.in_force.length, state.in_force.max_bytes);
-    return true;
   });
   if (state.events)
     watch (self, frame);
@@ -283,10 +282,7 @@ set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *) noexcept
   const auto &before = state.frames.caps;
   if (before && !gst_caps_is_equal (before.get (), caps))
     begin_anew (self);
-  locked (state.mutex, [&] {
-    state.frames.caps.reset (gst_caps_ref (caps));
-    return true;
-  });
+  locked (state.mutex, [&] { state.frames.caps.reset (gst_caps_ref (caps)); });
   if (state.events && !state.events->fits ({info.width, info.height}))
     POST_WARNING (self, STREAM, FORMAT,
         "The region " + rect_text (*state.events->rule ().region) +

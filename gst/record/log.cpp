@@ -34,19 +34,31 @@ GST_DEBUG_CATEGORY_STATIC (codedexposure_log_debug);
 namespace
 {
 
-struct LogState {
+/** What a flush begins anew. Streaming thread, and start and stop, which
+ * exclude it. */
+struct Written {
+  guint64 frames = 0;
+  std::optional<guint64> last; ///< largest number of a frame with a meta
+  std::set<guint64> missing;   ///< numbers that were counted as lost
+  /** As last written to the file. */
+  std::optional<Schedule> schedule;
+  std::optional<Mapping> mapping;
+  std::optional<BenchProfile> bench;
+  /** As last written to the track, and the PTS of that frame. */
+  std::optional<StreamSetup> tracked;
+  GstClockTime tracked_at = GST_CLOCK_TIME_NONE;
+};
+
+struct LogState : Written {
   /* Object lock: */
   std::string location;
   guint64 frames_lost = 0; ///< since the first
-  /* Streaming thread, and start and stop, which exclude it: */
+  /* As above: */
   LineFile file;
   GstPad *track = nullptr; ///< the element's
   PartnerOutput partners;
   bool stream_sent = false; ///< to the track
   bool segment_sent = false;
-  guint64 frames = 0;
-  std::optional<guint64> last; ///< largest number of a frame with a meta
-  std::set<guint64> missing;   ///< numbers that were counted as lost
   GstVideoInfo info = {};
   bool is_raw = true;   ///< frames are pixels, which @c info describes
   GstClockTime end = 0; ///< of the last frame
@@ -56,13 +68,6 @@ struct LogState {
   std::vector<StreamSetup> setups; ///< all, the last one last
   bool setup_is_short = false;     ///< each line can have it
   bool said_partner = false;
-  /** As last written to the file. */
-  std::optional<Schedule> schedule;
-  std::optional<Mapping> mapping;
-  std::optional<BenchProfile> bench;
-  /** As last written to the track, and the PTS of that frame. */
-  std::optional<StreamSetup> tracked;
-  GstClockTime tracked_at = GST_CLOCK_TIME_NONE;
 };
 
 struct GstCodedExposureLog : Instance<GstBaseTransform, LogState> {
@@ -241,18 +246,13 @@ note_setup (LogState &state, const StreamSetup &setup)
   state.setups.push_back (setup);
   if (!state.file.is_open ())
     return;
-  if (!(state.schedule == state.setup->schedule)) {
-    state.schedule = state.setup->schedule;
-    state.file.write (state.schedule->to_json ());
-  }
-  if (state.setup->mapping && !(state.mapping == state.setup->mapping)) {
-    state.mapping = state.setup->mapping;
-    state.file.write (state.mapping->to_json ());
-  }
-  if (state.setup->bench && !(state.bench == state.setup->bench)) {
-    state.bench = state.setup->bench;
-    state.file.write (state.bench->to_json ());
-  }
+  const auto write_once = [&state] (auto &written, const auto &value) {
+    if (value && !(written == value))
+      state.file.write ((written = value)->to_json ());
+  };
+  write_once (state.schedule, std::optional (state.setup->schedule));
+  write_once (state.mapping, state.setup->mapping);
+  write_once (state.bench, state.setup->bench);
 }
 
 /* The tags that go on say whether there is a track, where its own lines need
@@ -310,13 +310,7 @@ begin_anew (GstCodedExposureLog *self)
     state.frames_lost = 0;
     return state.location;
   });
-  state.frames = 0;
-  state.last.reset ();
-  state.missing.clear ();
-  state.schedule.reset ();
-  state.mapping.reset ();
-  state.bench.reset ();
-  state.tracked.reset ();
+  static_cast<Written &> (state) = {};
   const bool has_file = location.empty () || state.file.open (self, location);
   if (has_file && state.setup)
     note_setup (state, StreamSetup (*state.setup));

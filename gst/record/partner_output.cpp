@@ -16,11 +16,9 @@ namespace codedexposure::gst
 void
 PartnerOutput::restart ()
 {
-  setup_.reset ();
-  last_.reset ();
-  last_number_.reset ();
-  caps_.reset ();
-  stream_sent_ = segment_sent_ = setup_sent_ = false;
+  PartnerOutput fresh;
+  fresh.pad_ = pad_;
+  *this = std::move (fresh);
 }
 
 void

@@ -156,9 +156,10 @@ protected:
   /** Learns from a frame outside of the part that a seek asked for: it has no
    * pictures. */
   virtual GstFlowReturn learn (CodedFrame) { return GST_FLOW_OK; }
-  /** Prepares for frames of @p format: take_caps (). On failure posts an error,
-   * keeps the plan in force and returns false. */
-  virtual bool plan (const CodedFormat &format) = 0;
+  /** Prepares for frames of @p format, and adds the caps of pictures to @p
+   * caps, which has those of coded frames. On failure posts an error, keeps the
+   * plan in force and returns false. */
+  virtual bool plan (const CodedFormat &format, PadCaps &caps) = 0;
   /** Called after the source pads got the caps of the plan. */
   virtual void planned (bool /* schedule_changed */) {}
   /** Pushes all frames that are held. */
@@ -216,8 +217,6 @@ protected:
   void each_pad (const PadVisitor &visit) const;
   /** The caps in force of @p pad; null: none yet. Any thread. */
   CapsPtr caps_for (const GstCodedPad *pad) const;
-  /** Puts them into force with the plan. */
-  void take_caps (PadCaps caps);
   GstElement *element () const { return element_; }
   GstPad *sinkpad () const { return sinkpad_; }
   bool has_format () const { return stream_.format.has_value (); }
@@ -230,12 +229,12 @@ protected:
   {
     return stream_.bench ? &*stream_.bench : nullptr;
   }
-  /** Of the second camera, as the tags say; none: frames have no partners. */
-  const std::optional<PartnerSetup> &tagged_partner () const
+  /** As the tags say, which may say nothing. */
+  const StreamSetup &tagged () const
   {
-    static const std::optional<PartnerSetup> none;
-    return stream_.tagged && *stream_.tagged ? stream_.tagged->value ().partner
-                                             : none;
+    static const StreamSetup nothing;
+    return stream_.tagged && *stream_.tagged ? stream_.tagged->value ()
+                                             : nothing;
   }
   /** From the property, else from the frames, else from their tag, else from
    * the bench profile; 0: all bits of the format. */

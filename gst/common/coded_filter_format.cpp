@@ -17,12 +17,6 @@ namespace
 {
 
 std::string
-text_of (Extent size)
-{
-  return std::to_string (size.width) + "x" + std::to_string (size.height);
-}
-
-std::string
 text_of (GstClockTime time)
 {
   return CharPtr (g_strdup_printf ("%" GST_TIME_FORMAT, GST_TIME_ARGS (time)))
@@ -59,8 +53,13 @@ CodedFilter::negotiate (GstBuffer *next)
     if (const GstFlowReturn flow = drain (); flow != GST_FLOW_OK)
       return flow;
     auto format = find_format ();
-    if (!format || !plan (*format))
+    if (!format)
       return GST_FLOW_NOT_NEGOTIATED;
+    PadCaps caps;
+    caps.of (PadKind::coded).reset (gst_caps_ref (format->caps.get ()));
+    if (!plan (*format, caps))
+      return GST_FLOW_NOT_NEGOTIATED;
+    locked (element_, [&] { caps_ = std::move (caps); });
     adopt (std::move (*format), next);
   }
   if (awaits_excerpt ())
@@ -92,10 +91,7 @@ CodedFilter::find_format ()
         "The coded frames have no frame rate, so pictures have no duration. "
         "Set the frame-rate property, for example frame-rate=25/1.");
   format.rate = {info.fps_n, info.fps_d};
-  stream_.tagged_bits =
-      stream_.tagged && *stream_.tagged
-          ? significant_bits_of (stream_.tagged->value ().bits, info)
-          : 0;
+  stream_.tagged_bits = significant_bits_of (tagged ().bits, info);
   format.size = {info.width, info.height};
   if (stream_.not_coded)
     return refused (*stream_.not_coded);
@@ -123,11 +119,11 @@ CodedFilter::find_schedule (CodedFormat &format)
     report_overruled (format.schedule);
     return true;
   }
-  if (const auto &tagged = stream_.tagged) {
-    if (!*tagged)
+  if (stream_.tagged) {
+    if (!*stream_.tagged)
       return post_error ("The schedule in the stream's tags cannot be read: " +
-                         tagged->error ().message);
-    format.schedule = tagged->value ().schedule;
+                         stream_.tagged->error ().message);
+    format.schedule = tagged ().schedule;
     return true;
   }
   if (stream_.settings.require_schedule)
@@ -147,9 +143,9 @@ CodedFilter::find_schedule (CodedFormat &format)
 bool
 CodedFilter::check_camera (const CodedFormat &format) const
 {
-  if (stream_.settings.schedule.read || !stream_.tagged || !*stream_.tagged)
+  if (stream_.settings.schedule.read)
     return true;
-  const StreamSetup &camera = stream_.tagged->value ();
+  const StreamSetup &camera = tagged ();
   if (camera.off_beam)
     return post_error (
         "These are frames of the beam of the mirrors that are off, partners of "
@@ -159,9 +155,9 @@ CodedFilter::check_camera (const CodedFormat &format) const
       " Decode the frames as the camera gave them, or set the schedule "
       "property.";
   if (camera.size && *camera.size != format.size)
-    return post_error ("The coded frames have " + text_of (format.size) +
+    return post_error ("The coded frames have " + size_text (format.size) +
                        " pixels, but the camera gave " +
-                       text_of (*camera.size) +
+                       size_text (*camera.size) +
                        ": they were cropped or scaled." + remedy);
   const FrameRate rate = camera.rate.value_or (format.rate);
   if (std::int64_t (rate.num) * format.rate.den ==
@@ -180,13 +176,13 @@ CodedFilter::report_overruled (const Schedule &asked)
 {
   if (!stream_.tagged || !*stream_.tagged)
     return;
-  const Schedule &tagged = stream_.tagged->value ().schedule;
-  if (tagged == asked || stream_.overruled == tagged)
+  const Schedule &said = tagged ().schedule;
+  if (said == asked || stream_.overruled == said)
     return;
-  stream_.overruled = tagged;
+  stream_.overruled = said;
   POST_WARNING (element_, STREAM, FORMAT,
       "The schedule property, " + asked.text () +
-          ", overrides the schedule of the stream, " + tagged.text () + ".");
+          ", overrides the schedule of the stream, " + said.text () + ".");
 }
 
 /* Whether frames of @info can be those of the bench. */
@@ -206,22 +202,18 @@ CodedFilter::check_bench (const GstVideoInfo &info) const
 bool
 CodedFilter::find_bench (CodedFormat &format)
 {
-  stream_.bench.reset ();
+  stream_.bench = tagged ().bench;
   const auto fits = [this] (const auto &good) {
     if (!good)
       post_error (
           "The bench profile does not fit: " + good.error ().message + ".");
     return good.ok ();
   };
-  if (stream_.tagged && *stream_.tagged)
-    stream_.bench = stream_.tagged->value ().bench;
   if (const auto &asked = stream_.settings.bench.read) {
     if (!*asked)
       return post_error (
           "The bench property cannot be read: " + asked->error ().message);
-    const bool tagged = stream_.tagged && *stream_.tagged;
-    const BenchProfile given =
-        asked->value ().of_beam (tagged && stream_.tagged->value ().off_beam);
+    const BenchProfile given = asked->value ().of_beam (tagged ().off_beam);
     if (stream_.bench && !fits (given.check_bench (*stream_.bench)))
       return false;
     stream_.bench = given;
@@ -261,14 +253,14 @@ CodedFilter::find_mapping (Extent camera, std::optional<Mapping> &mapping)
     if (mapping->camera () == camera)
       return true;
     return post_error ("The mapping " + stream_.settings.mapping.text +
-                       " is for frames of " + text_of (mapping->camera ()) +
-                       " pixels, but these have " + text_of (camera) +
+                       " is for frames of " + size_text (mapping->camera ()) +
+                       " pixels, but these have " + size_text (camera) +
                        ". Measure a new mapping with moirecalib.");
   }
   if (stream_.settings.bench.read)
     mapping = stream_.bench->mapping;
-  if (!mapping && stream_.tagged && *stream_.tagged)
-    mapping = stream_.tagged->value ().mapping;
+  if (!mapping)
+    mapping = tagged ().mapping;
   if (!mapping && stream_.bench)
     mapping = stream_.bench->known_mapping ();
   if (!mapping || mapping->camera () == camera)
@@ -276,8 +268,8 @@ CodedFilter::find_mapping (Extent camera, std::optional<Mapping> &mapping)
   if (!std::exchange (stream_.warned_of_mapping, true))
     POST_WARNING (element_, STREAM, FORMAT,
         "The mapping in the stream's tags is for frames of " +
-            text_of (mapping->camera ()) + " pixels, but these have " +
-            text_of (camera) +
+            size_text (mapping->camera ()) + " pixels, but these have " +
+            size_text (camera) +
             "; they are decoded without it. Do not scale or crop coded "
             "frames.");
   mapping.reset ();
@@ -335,8 +327,7 @@ CodedFilter::set_provenance (GstBuffer *next)
   made.setup.size = Extent{info.width, info.height};
   made.setup.rate = format ().rate;
   made.setup.bits = significant_bits_of (significant_bits (), info);
-  if (stream_.tagged && *stream_.tagged)
-    made.setup.simulated = stream_.tagged->value ().simulated;
+  made.setup.simulated = tagged ().simulated;
   if ((made.setup.bench = stream_.bench))
     made.setup.bench->mapping.reset ();
   stream_.provenance_due = true;

@@ -64,13 +64,6 @@ CodedFilter::caps_for (const GstCodedPad *pad) const
   return CapsPtr (caps ? gst_caps_ref (caps) : nullptr);
 }
 
-void
-CodedFilter::take_caps (PadCaps caps)
-{
-  const ObjectLock lock (element_);
-  caps_ = std::move (caps);
-}
-
 /* ------------------------------------------------- requests and releases -- */
 
 GstCodedPad *

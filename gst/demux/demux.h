@@ -52,7 +52,7 @@ private:
   using Targets = std::vector<Target>;
 
   GstFlowReturn process (CodedFrame frame) override;
-  bool plan (const CodedFormat &format) override;
+  bool plan (const CodedFormat &format, PadCaps &caps) override;
   void planned (bool schedule_changed) override;
   void flushed () override { live_.reset (); }
   void take_settings () override { in_force_ = settings_; }

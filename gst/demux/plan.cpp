@@ -131,7 +131,7 @@ report_regions (GstElement *element, const Schedule &schedule)
 } // namespace
 
 bool
-Demux::plan (const CodedFormat &format)
+Demux::plan (const CodedFormat &format, PadCaps &caps)
 {
   ExtractOptions options = in_force_.extract;
   options.bits = significant_bits ();
@@ -140,7 +140,6 @@ Demux::plan (const CodedFormat &format)
   if (!parts)
     return post_error (parts.error ().message);
   Plan made{std::move (*parts), {}, {}};
-  PadCaps caps;
   for (const SplitPart &part : made.parts) {
     CapsPtr one = part_caps (format, part, false);
     gst_video_info_from_caps (&made.infos.emplace_back (), one.get ());
@@ -151,13 +150,11 @@ Demux::plan (const CodedFormat &format)
     if (!is_region)
       caps.of (PadKind::one) = std::move (one);
   }
-  caps.of (PadKind::coded).reset (gst_caps_ref (format.caps.get ()));
   for (const bool backwards : {false, true})
     made.turns[backwards] = order_subframes (made.parts, backwards);
   log_plan (element (), format, made);
   plan_ = std::move (made);
   scratch_.clear ();
-  take_caps (std::move (caps));
   return true;
 }
 

@@ -54,7 +54,7 @@ private:
   GstFlowReturn process (CodedFrame frame) override;
   Reach reach () const override;
   GstFlowReturn learn (CodedFrame frame) override;
-  bool plan (const CodedFormat &format) override;
+  bool plan (const CodedFormat &format, PadCaps &caps) override;
   void planned (bool schedule_changed) override;
   GstFlowReturn drain () override;
   void break_history () override;

@@ -195,7 +195,7 @@ Fuse::partner_noise (const CodedFormat &format) const
   SensorNoise noise = in_force_.of_second;
   const Schedule &schedule = format.schedule;
   const SensorNoise first = this->noise (schedule);
-  const PartnerSetup &known = *tagged_partner ();
+  const PartnerSetup &known = *tagged ().partner;
   const auto complement = schedule.complement ();
   const double largest =
       format.wide () ? largest_pixel_of<std::uint16_t> (significant_bits ())
@@ -280,7 +280,7 @@ of_sixteen_bits (GstCaps *caps)
 std::optional<PartnerReader>
 Fuse::plan_partners (const CodedFormat &format) const
 {
-  const std::optional<PartnerSetup> &partner = tagged_partner ();
+  const std::optional<PartnerSetup> &partner = tagged ().partner;
   if (!partner)
     return std::nullopt;
   RectifyOptions options = rectify_options_of (partner_noise (format));
@@ -316,13 +316,13 @@ Fuse::plan_correction (
 }
 
 bool
-Fuse::plan (const CodedFormat &format)
+Fuse::plan (const CodedFormat &format, PadCaps &caps)
 {
   FuseOptions options = in_force_;
   auto partners = plan_partners (format);
   options.partner = partners.has_value ();
   if (partners) {
-    options.partner_black = tagged_partner ()->black;
+    options.partner_black = tagged ().partner->black;
     options.partner_noise = partner_noise (format);
   }
   options.bits = significant_bits ();
@@ -342,10 +342,8 @@ Fuse::plan (const CodedFormat &format)
   const CapsPtr rectified = format.rectifier
                                 ? format.resized (format.size)
                                 : CapsPtr (gst_caps_ref (format.caps.get ()));
-  PadCaps caps;
   CapsPtr &fused = caps.of (PadKind::all);
   CapsPtr &uncertainty = caps.of (PadKind::uncertainty);
-  caps.of (PadKind::coded).reset (gst_caps_ref (format.caps.get ()));
   fused.reset (scale_caps (rectified.get (), coded_to_fused (format.schedule)));
   uncertainty = of_sixteen_bits (fused.get ());
   const int history =
@@ -370,7 +368,6 @@ Fuse::plan (const CodedFormat &format)
     POST_WARNING (element (), STREAM, FORMAT,
         "The exposures between coded frames are not used: " + reason +
             ". Leave overlap at 1.");
-  take_caps (std::move (caps));
   return true;
 }
 

@@ -91,7 +91,7 @@ private:
 
   GstFlowReturn process (CodedFrame frame) override;
   Reach reach () const override { return {}; }
-  bool plan (const CodedFormat &format) override;
+  bool plan (const CodedFormat &format, PadCaps &caps) override;
   void forget () override;
   CapsScale scale_for (
       const Schedule &schedule, const GstCodedPad *) const override
@@ -151,7 +151,7 @@ sees (const Rectifier *camera, int x, int y)
 Result<Plan>
 Sum::make_plan (const CodedFormat &format)
 {
-  const std::optional<PartnerSetup> &partner = tagged_partner ();
+  const std::optional<PartnerSetup> &partner = tagged ().partner;
   if (!partner)
     return Error{"Coded frames have no partners to be added to: put "
                  "codedexposure-pair before this element."};
@@ -179,7 +179,7 @@ Sum::make_plan (const CodedFormat &format)
 }
 
 bool
-Sum::plan (const CodedFormat &format)
+Sum::plan (const CodedFormat &format, PadCaps &caps)
 {
   auto made = make_plan (format);
   if (!made)
@@ -187,14 +187,11 @@ Sum::plan (const CodedFormat &format)
   const CapsPtr rectified = format.rectifier
                                 ? format.resized (format.size)
                                 : CapsPtr (gst_caps_ref (format.caps.get ()));
-  PadCaps caps;
   CapsPtr &sum = caps.of (PadKind::all);
-  caps.of (PadKind::coded).reset (gst_caps_ref (format.caps.get ()));
   sum.reset (
       scale_caps (rectified.get (), scale_for (format.schedule, nullptr)));
   gst_video_info_from_caps (&made->info, sum.get ());
   plan_ = *std::move (made);
-  take_caps (std::move (caps));
   return true;
 }
 

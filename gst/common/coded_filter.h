@@ -6,12 +6,14 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include <gst/base/gstflowcombiner.h>
 #include <gst/gst.h>
 #include <gst/video/video.h>
 
+#include "base/pixels.h"
 #include "base/result.h"
 #include "caps.h"
 #include "coded_pad.h"
@@ -111,6 +113,39 @@ struct Picture {
   GstClockTime exposure_start, exposure_duration;
   bool of_region = false; ///< its coordinates are not those of the coded frame
 };
+
+/** A frame of either depth, whose memory is used again. */
+using Scratch = std::tuple<Image<std::uint8_t>, Image<std::uint16_t>>;
+template <typename Pixel>
+Image<Pixel> &
+image_in (Scratch &scratch, Extent size)
+{
+  auto &image = std::get<Image<Pixel>> (scratch);
+  if (image.width () != size.width || image.height () != size.height)
+    image = Image<Pixel> (size.width, size.height);
+  return image;
+}
+
+/** What @p seen shows by @p rectifier, in @p to. @p bits: significant ones; 0:
+ * all. @p errors, if it is not null, and @p workers: see Rectifier::run (). */
+template <typename Pixel>
+Result<ImageView<const Pixel>>
+rectify (const Rectifier &rectifier, ImageView<const Pixel> seen, int bits,
+    Scratch &to, Image<float> *errors, Workers *workers)
+{
+  const auto [width, height] = rectifier.mirrors ();
+  auto &mirrors = image_in<Pixel> (to, {width, height});
+  std::optional<ImageView<float>> wanted;
+  if (errors) {
+    *errors = Image<float> (width, height);
+    wanted = errors->view ();
+  }
+  if (const auto done = rectifier.run (seen, mirrors.view (),
+          bits > 0 ? largest_pixel (bits) : 0, wanted, workers);
+      !done)
+    return done.error ();
+  return ImageView<const Pixel> (mirrors.view ());
+}
 
 /**
  * The implementation of a GstCodedFilter; a subclass makes pictures from
@@ -251,7 +286,7 @@ protected:
    * a mapping, one pixel a mirror. Valid until the next call.
    * @p errors  set with a mapping: see Rectifier::run (). */
   template <typename Pixel>
-  Result<ImageView<const Pixel>> rectify (
+  Result<ImageView<const Pixel>> light_of (
       ImageView<const Pixel> coded, Image<float> *errors = nullptr);
   /** Share the rows of frames that are rectified; made when first needed. */
   Workers &rectify_workers ();
@@ -316,14 +351,6 @@ private:
     Schedule schedule;
     RectifyOptions options;
     std::shared_ptr<const Rectifier> rectifier;
-  };
-  /** A frame of either depth. */
-  struct Scratch {
-    Image<std::uint8_t> narrow;
-    Image<std::uint16_t> wide;
-
-    template <typename Pixel>
-    Image<Pixel> &of (Extent size);
   };
   /** Reset from PAUSED to READY. */
   struct Stream {

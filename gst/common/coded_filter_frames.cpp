@@ -7,7 +7,6 @@
 #include <thread>
 #include <utility>
 
-#include "base/pixels.h"
 #include "extract/black_level.h"
 #include "record.h"
 
@@ -425,16 +424,6 @@ CodedFilter::map_coded (GstBuffer *frame) const
   return coded;
 }
 
-template <typename Pixel>
-Image<Pixel> &
-CodedFilter::Scratch::of (Extent size)
-{
-  auto &image = std::get<Image<Pixel> &> (std::tie (narrow, wide));
-  if (image.width () != size.width || image.height () != size.height)
-    image = Image<Pixel> (size.width, size.height);
-  return image;
-}
-
 Workers &
 CodedFilter::rectify_workers ()
 {
@@ -451,34 +440,24 @@ CodedFilter::rectify_workers ()
 
 template <typename Pixel>
 Result<ImageView<const Pixel>>
-CodedFilter::rectify (ImageView<const Pixel> coded, Image<float> *errors)
+CodedFilter::light_of (ImageView<const Pixel> coded, Image<float> *errors)
 {
   const int bits = significant_bits ();
   if (const int black = bench () ? bench ()->black () : 0; black > 0) {
-    auto &light = stream_.light.of<Pixel> ({coded.width, coded.height});
+    auto &light = image_in<Pixel> (stream_.light, {coded.width, coded.height});
     subtract_black (coded, black, bits, light.view ());
     coded = light.view ();
   }
   const Rectifier *rectifier = format ().rectifier.get ();
   if (!rectifier)
     return coded;
-  auto &rectified = stream_.rectified.of<Pixel> (rectifier->mirrors ());
-  std::optional<ImageView<float>> wanted;
-  if (errors) {
-    const auto [width, height] = rectifier->mirrors ();
-    *errors = Image<float> (width, height);
-    wanted = errors->view ();
-  }
-  if (const auto done = rectifier->run (coded, rectified.view (),
-          bits > 0 ? largest_pixel (bits) : 0, wanted, &rectify_workers ());
-      !done)
-    return done.error ();
-  return ImageView<const Pixel> (rectified.view ());
+  return rectify (
+      *rectifier, coded, bits, stream_.rectified, errors, &rectify_workers ());
 }
 
-template Result<ImageView<const std::uint8_t>> CodedFilter::rectify (
+template Result<ImageView<const std::uint8_t>> CodedFilter::light_of (
     ImageView<const std::uint8_t>, Image<float> *);
-template Result<ImageView<const std::uint16_t>> CodedFilter::rectify (
+template Result<ImageView<const std::uint16_t>> CodedFilter::light_of (
     ImageView<const std::uint16_t>, Image<float> *);
 
 /* A seek may begin or end within a coded frame. */

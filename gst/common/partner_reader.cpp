@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "common/partner_reader.h"
 
-#include "base/pixels.h"
 #include "base/try.h"
 
 namespace codedexposure::gst
@@ -52,18 +51,9 @@ PartnerReader::read (
   const View seen = view_of<const Pixel> (mapped_->frame);
   if (!rectifier_)
     return std::optional<View> (seen);
-  Image<Pixel> &image = this->image<Pixel> ();
-  const auto [width, height] = rectifier_->mirrors ();
-  if (image.width () != width || image.height () != height)
-    image = Image<Pixel> (width, height);
-  std::optional<ImageView<float>> wanted;
-  if (errors) {
-    *errors = Image<float> (width, height);
-    wanted = errors->view ();
-  }
-  RETURN_IF_ERROR (rectifier_->run (seen, image.view (),
-      bits > 0 ? largest_pixel (bits) : 0, wanted, workers));
-  return std::optional<View> (image.view ());
+  ASSIGN_OR_RETURN (const View mirrors,
+      rectify (*rectifier_, seen, bits, rectified_, errors, workers));
+  return std::optional<View> (mirrors);
 }
 
 template Result<std::optional<ImageView<const std::uint8_t>>>

@@ -4,7 +4,6 @@
 
 #include <memory>
 #include <optional>
-#include <tuple>
 
 #include "base/image.h"
 #include "common/coded_filter.h"
@@ -33,7 +32,7 @@ public:
   template <typename Pixel>
   ImageView<Pixel> rectified ()
   {
-    return image<Pixel> ().view ();
+    return std::get<Image<Pixel>> (rectified_).view ();
   }
 
 private:
@@ -46,13 +45,7 @@ private:
   Extent size_;
   std::shared_ptr<const Rectifier> rectifier_; ///< null: a pixel a mirror
   std::unique_ptr<Mapped> mapped_;
-  template <typename Pixel>
-  Image<Pixel> &image ()
-  {
-    return std::get<Image<Pixel> &> (std::tie (narrow_, wide_));
-  }
-  Image<std::uint8_t> narrow_; ///< resampled
-  Image<std::uint16_t> wide_;
+  Scratch rectified_;
 };
 
 extern template Result<std::optional<ImageView<const std::uint8_t>>>

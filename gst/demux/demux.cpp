@@ -364,7 +364,7 @@ Demux::render (CodedFrame &frame, std::vector<Targets> &parts)
   MappedFrame coded = map_coded (frame.buffer.get ());
   if (!coded)
     return GST_FLOW_ERROR;
-  const auto light = rectify (view_of<const Pixel> (coded));
+  const auto light = light_of (view_of<const Pixel> (coded));
   if (!light)
     return post_decode_error (light.error ());
   GstFlowReturn flow = GST_FLOW_OK;

@@ -216,7 +216,7 @@ Fuse::take_pixels (GstBuffer *buffer, MappedFrame &coded)
   }
   const auto view = view_of<const Pixel> (coded);
   const guint64 saturated = count_saturated (view, significant_bits ());
-  const auto rectified = rectify (view, wanted ? &errors : nullptr);
+  const auto rectified = light_of (view, wanted ? &errors : nullptr);
   if (!rectified)
     return rectified.error ();
   const auto view_of_known = [] (Image<float> &image) {

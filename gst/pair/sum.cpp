@@ -213,7 +213,7 @@ Sum::add (CodedFrame &frame, MappedFrame &coded, MappedFrame &sum)
           plan_->partners.rectifier () ? &rectify_workers () : nullptr));
   if (!other)
     return false;
-  ASSIGN_OR_RETURN (const auto own, rectify (view_of<const Pixel> (coded)));
+  ASSIGN_OR_RETURN (const auto own, light_of (view_of<const Pixel> (coded)));
   const auto view = view_of<Pixel> (sum);
   const double ratio = plan_->sum.add (own, *other, plan_->levels, view);
   frame.meta.saturated = count_saturated (ImageView<const Pixel> (view), bits);

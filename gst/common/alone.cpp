@@ -14,11 +14,8 @@ AloneFrames::add (gpointer element, GstClockTime pts, const char *reason)
   if (frames_++ == 0) {
     from_ = pts;
     reason_ = reason;
-    post_message (element, PartnerLost{.active = true,
-                               .reason = reason,
-                               .frames = {},
-                               .from = pts,
-                               .to = {}});
+    post_message (
+        element, PartnerLost{.active = true, .reason = reason, .from = pts});
   }
   last_ = pts;
 }

@@ -392,9 +392,7 @@ CodedFilter::note_saturation (const CodedFrame &frame)
   burst.from = pts;
   post_message (element_, Saturated{.active = true,
                               .frame = frame.meta.frame,
-                              .frames = {},
                               .from = pts,
-                              .to = {},
                               .pixels = frame.meta.saturated});
   notify ("stats");
 }
@@ -406,7 +404,6 @@ CodedFilter::end_saturation ()
   if (burst.frames == 0)
     return;
   post_message (element_, Saturated{.active = false,
-                              .frame = {},
                               .frames = burst.frames,
                               .from = burst.from,
                               .to = burst.to,

@@ -23,11 +23,11 @@ struct FramesLost {
 /** A sequence of saturated frames begins or ends. */
 struct Saturated {
   static constexpr const char *kName = "codedexposure/saturated";
-  bool active = false;           ///< it begins
-  std::optional<guint64> frame;  ///< at the beginning: its number
-  std::optional<guint64> frames; ///< at the end: how many there were
+  bool active = false;                ///< it begins
+  std::optional<guint64> frame = {};  ///< at the beginning: its number
+  std::optional<guint64> frames = {}; ///< at the end: how many there were
   GstClockTime from = 0;
-  std::optional<GstClockTime> to; ///< at the end
+  std::optional<GstClockTime> to = {}; ///< at the end
   /** Saturated pixels of the first frame; at the end, of the worst. */
   guint64 pixels = 0;
   CODED_FIELDS (active, frame, frames, from, to, pixels);
@@ -41,11 +41,11 @@ struct PartnerLost {
   /** Of the first: "missing", "damaged", one of the two, or "other-exposure",
    * by the pixels. */
   std::string reason;
-  std::optional<guint64> frames; ///< at the end: how many there were
+  std::optional<guint64> frames = {}; ///< at the end: how many there were
   GstClockTime from = 0;
   /** At the end: of the first that has a partner again; at the end of the
    * stream, of the last without. */
-  std::optional<GstClockTime> to;
+  std::optional<GstClockTime> to = {};
   CODED_FIELDS (active, reason, frames, from, to);
 };
 
@@ -65,7 +65,7 @@ struct PartnerDrifted {
 /** The last frames have become a recording, from codedexposure-keep. */
 struct Kept {
   static constexpr const char *kName = "codedexposure/kept";
-  std::string location;
+  std::string location = {};
   guint64 frames = 0;
   GstClockTime duration = 0;    ///< from the first frame to the last
   std::optional<guint64> frame; ///< number of the first
@@ -197,11 +197,11 @@ struct CameraBack {
  * when it is over. */
 struct FramesDamaged {
   static constexpr const char *kName = "codedexposure/frames-damaged";
-  bool active = false;          ///< it begins
-  guint64 frame = 0;            ///< the first of them
-  std::optional<guint64> count; ///< at the end: how many there were
+  bool active = false;               ///< it begins
+  guint64 frame = 0;                 ///< the first of them
+  std::optional<guint64> count = {}; ///< at the end: how many there were
   GstClockTime from = 0;
-  std::string reason; ///< of the first
+  std::string reason = {}; ///< of the first
   CODED_FIELDS (active, frame, count, from, reason);
 };
 /** codedexposure-recorddemux: the recording knows of frames that did not come.

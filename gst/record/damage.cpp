@@ -35,11 +35,9 @@ DamageReport::frame_flagged (
     return;
   open_.frame = number;
   open_.from = pts;
-  post_message (element_, FramesDamaged{.active = true,
-                              .frame = number,
-                              .count = {},
-                              .from = pts,
-                              .reason = reason});
+  post_message (element_,
+      FramesDamaged{
+          .active = true, .frame = number, .from = pts, .reason = reason});
 }
 
 void
@@ -50,8 +48,7 @@ DamageReport::end_sequence ()
     post_message (element_, FramesDamaged{.active = false,
                                 .frame = over.frame,
                                 .count = over.count,
-                                .from = over.from,
-                                .reason = {}});
+                                .from = over.from});
 }
 
 void

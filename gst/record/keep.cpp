@@ -121,8 +121,7 @@ write_frames (GstCodedExposureKeep *self, KeptFrames frames)
 {
   KeepState &state = self->state;
   const auto meta = get_frame_meta (frames.buffers.front ().get ());
-  Kept kept{.location = {},
-      .frames = frames.buffers.size (),
+  Kept kept{.frames = frames.buffers.size (),
       .duration = frames.length (),
       .frame = meta ? std::optional (meta->frame) : std::nullopt};
   const auto written = write_kept (std::move (frames),

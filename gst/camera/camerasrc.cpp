@@ -151,10 +151,9 @@ check (GstElement *element)
         "package libaravis-0.8-0.");
     return false;
   }
-  const auto bench = read_again (self, self->state.settings.bench).read;
-  if (bench && !*bench)
-    return refuse_settings (
-        self, "The bench property cannot be read: " + bench->error ().message);
+  if (!check_named (
+          self, "bench", read_again (self, self->state.settings.bench)))
+    return false;
   const Result<void> good = check_settings (settings_of (self));
   if (!good)
     POST_ERROR (self, RESOURCE, SETTINGS, good.error ().message);

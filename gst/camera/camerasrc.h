@@ -74,8 +74,8 @@ inline constexpr auto &state = state_in<GstCodedExposureCameraSrc>;
 bool set_up_source (GstCodedExposureCameraSrc *self);
 
 /** How long the camera exposes each frame, as it says itself once aravissrc has
- * set it up. None: another device says it, or it changes by itself, or the build
- * has no Aravis. */
+ * set it up. None: another device says it, or it changes by itself, or the
+ * build has no Aravis. */
 GstClockTime exposure_of_camera (GstCodedExposureCameraSrc *self);
 
 /** Sees every frame and event that aravissrc pushes, and every query to it. */

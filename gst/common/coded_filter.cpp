@@ -183,16 +183,12 @@ CodedFilter::CodedFilter (GstElement *element, const StatsNames &names)
 bool
 CodedFilter::read_settings ()
 {
-  const auto check = [this] (const char *property, const auto &named) {
-    return !named.read || *named.read ||
-           refuse_settings (element_,
-               std::string ("The ") + property +
-                   " property cannot be read: " + named.read->error ().message);
+  const auto check = [this] (const char *property, auto &named) {
+    return check_named (element_, property, read_again (element_, named));
   };
   CodedSettings &settings = shared_.settings;
-  return check ("schedule", read_again (element_, settings.schedule)) &&
-         check ("mapping", read_again (element_, settings.mapping)) &&
-         check ("bench", read_again (element_, settings.bench));
+  return check ("schedule", settings.schedule) &&
+         check ("mapping", settings.mapping) && check ("bench", settings.bench);
 }
 
 /* The counters of a run can be read until the next one begins. */

@@ -99,6 +99,13 @@ base_transform_class ()
   return GST_BASE_TRANSFORM_CLASS (g_type_class_peek (GST_TYPE_BASE_TRANSFORM));
 }
 
+void
+set_up_passing (gpointer transform)
+{
+  gst_base_transform_set_passthrough (GST_BASE_TRANSFORM (transform), TRUE);
+  gst_base_transform_set_qos_enabled (GST_BASE_TRANSFORM (transform), FALSE);
+}
+
 GstFlowReturn
 refuse_buffer (gpointer element, const GstVideoInfo &info, GstBuffer *buffer)
 {

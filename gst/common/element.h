@@ -164,6 +164,10 @@ GstPad *add_ghost_pad (GstElement *bin, const char *name, GstElement *inner);
 /** The class of GstBaseTransform, to call its default implementations. */
 GstBaseTransformClass *base_transform_class ();
 
+/** Completes an instance of GstBaseTransform whose pixels pass unchanged, and
+ * which drops nothing because it is late: a SetUpInstance of type_of (). */
+void set_up_passing (gpointer transform);
+
 /** Posts that @p buffer cannot be mapped as a frame of @p info. */
 GstFlowReturn refuse_buffer (
     gpointer element, const GstVideoInfo &info, GstBuffer *buffer);

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "base/result.h"
+#include "element.h"
 #include "wire.h"
 
 namespace codedexposure::gst
@@ -39,6 +40,18 @@ private:
       return T::parse (text);
   }
 };
+
+/** Posts an error of the property @p name of @p element, and returns false, if
+ * what it names cannot be read. */
+template <typename T>
+bool
+check_named (gpointer element, const char *name, const Named<T> &named)
+{
+  return !named.read || *named.read ||
+         refuse_settings (element,
+             std::string ("The ") + name +
+                 " property cannot be read: " + named.read->error ().message);
+}
 
 /** Reads the file of a setting of @p element again, because it may have
  * changed. Takes the object lock. */

@@ -65,12 +65,10 @@ bool
 read_schedule (GstDmdSync *self)
 {
   SyncState &st = state (self);
-  Result<Schedule> schedule = Schedule::parse (settings_of (self).schedule);
-  if (!schedule)
-    return refuse_settings (self,
-        "The schedule property cannot be read: " + schedule.error ().message);
-  const ObjectLock lock (self);
-  st.schedule = *std::move (schedule);
+  const auto named = read_again (self, st.settings.schedule);
+  if (!check_named (self, "schedule", named))
+    return false;
+  locked (self, [&] { st.schedule = named.read->value (); });
   return true;
 }
 
@@ -103,10 +101,10 @@ bool
 read_bench (GstDmdSync *self)
 {
   SyncState &st = state (self);
-  const auto given = read_again (self, st.settings.bench).read;
-  if (given && !*given)
-    return refuse_settings (
-        self, "The bench property cannot be read: " + given->error ().message);
+  const auto named = read_again (self, st.settings.bench);
+  if (!check_named (self, "bench", named))
+    return false;
+  const auto &given = named.read;
   if (given && given->value ().dmd && st.runner)
     if (const auto same = BenchProfile::check_device (
             "DMD", *given->value ().dmd, {.serial = st.runner->info ().serial});

@@ -161,10 +161,7 @@ void
 begin_run (GstDmdSync *self)
 {
   SyncState &st = self->state;
-  locked (self, [&] {
-    st.counters = Counters ();
-    st.observable = slip_observable (st.schedule);
-  });
+  locked (self, [&] { st.counters = Counters (); });
   say_observable (self);
   if (!st.runner)
     return;
@@ -232,17 +229,8 @@ set_up (gpointer klass)
   transform_class->generate_output = GST_DEBUG_FUNCPTR (sync::generate_output);
 }
 
-void
-set_up_instance (GstDmdSync *self)
-{
-  auto *transform = GST_BASE_TRANSFORM (self);
-  /* Pixels pass untouched: buffers are allocated as downstream wants them. */
-  gst_base_transform_set_passthrough (transform, TRUE);
-  gst_base_transform_set_qos_enabled (transform, FALSE);
-}
-
 } // namespace
 
 GST_ELEMENT_REGISTER_DEFINE (dmdsync, "dmdsync", GST_RANK_NONE,
-    (type_of<GstDmdSync, set_up, set_up_instance> (
+    (type_of<GstDmdSync, set_up, set_up_passing> (
         "GstDmdSync", GST_TYPE_BASE_TRANSFORM)))

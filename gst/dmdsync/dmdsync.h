@@ -47,7 +47,7 @@ inline constexpr const char *kExternal = "external";
 
 struct Settings {
   std::string device;
-  std::string schedule = "sequential:2x2";
+  Named<Schedule> schedule{"sequential:2x2"};
   Beam beam = Beam::kOn;
   Named<BenchProfile> bench;
   TimestampAt timestamp_at = TimestampAt::exposure_start;
@@ -128,11 +128,10 @@ struct SyncState {
   /* Object lock. */
   Settings settings;
   Counters counters;
-  std::optional<bool> locked; ///< of the last frame; none: unknown
-  SlipObservable observable = SlipObservable::never; ///< of the schedule
-  std::optional<Timebase> time;                      ///< that of the stream
-  GstClockTime jitter = 0;  ///< most by which frames came after their time
-  GstClockTime latency = 0; ///< our own
+  std::optional<bool> locked;   ///< of the last frame; none: unknown
+  std::optional<Timebase> time; ///< that of the stream
+  GstClockTime jitter = 0;      ///< most by which frames came after their time
+  GstClockTime latency = 0;     ///< our own
   std::optional<ShownPattern> pattern; ///< none: the schedule
   guint switches = 0;                  ///< between schedule and patterns
 

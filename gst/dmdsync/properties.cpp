@@ -55,6 +55,13 @@ stats (const SyncState &st)
   return stats;
 }
 
+SlipObservable
+observable_slip (const SyncState &st)
+{
+  const auto &read = st.settings.schedule.read;
+  return read && *read ? slip_observable (**read) : SlipObservable::never;
+}
+
 /* First those that users set. */
 PropertyTable<SyncState>
 properties ()
@@ -120,8 +127,7 @@ properties ()
       {"slip-observable", "Slip observable",
           "In which frames a slip of the DMD by whole slots can be seen with "
           "the schedule",
-          kReadOnly, &SyncState::observable,
-          gst_dmd_sync_slip_observable_get_type ()},
+          kReadOnly, observable_slip, gst_dmd_sync_slip_observable_get_type ()},
       {"stats", "Statistics",
           "All counters at one instant, of this run or the last one "
           "(docs/streams.md)",
@@ -129,39 +135,12 @@ properties ()
   };
 }
 
-/* The text may name a file, which is read before the object lock is taken. */
 void
-set_schedule (GstDmdSync *self, const GValue *value, const GParamSpec *pspec)
+changed (GObject *object, const GParamSpec *)
 {
-  std::string text = Wire<std::string>::get (value);
-  if (text.empty ())
-    text = Settings ().schedule;
-  const Result<Schedule> schedule = Schedule::parse (text);
-  const ObjectLock lock (self);
-  if (!may_set (self, pspec))
-    return;
-  SyncState &st = state (self);
-  st.settings.schedule = text;
-  if (schedule)
-    st.observable = slip_observable (*schedule);
-  else
-    GST_WARNING_OBJECT (self, "%s", schedule.error ().message.c_str ());
-}
-
-void
-set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
-{
-  auto *self = as<GstDmdSync> (object);
-  if (g_str_equal (pspec->name, "schedule"))
-    return set_schedule (self, value, pspec);
-  const auto assign = table_of<properties> ()[id].read (value);
-  {
-    const ObjectLock lock (self);
-    if (!may_set (self, pspec))
-      return;
-    assign (state (self));
-  }
-  update_latency (self);
+  auto &schedule = state (object).settings.schedule;
+  if (schedule.text.empty ())
+    schedule = Settings ().schedule;
 }
 
 } // namespace
@@ -169,8 +148,14 @@ set_property (GObject *object, guint id, const GValue *value, GParamSpec *pspec)
 void
 install_own_state (gpointer klass)
 {
-  install_state<GstDmdSync, properties> (klass);
-  G_OBJECT_CLASS (klass)->set_property = set_property;
+  install_state<GstDmdSync, properties, changed> (klass);
+  static const auto set = G_OBJECT_CLASS (klass)->set_property;
+  G_OBJECT_CLASS (klass)->set_property = [] (GObject *object, guint id,
+                                             const GValue *value,
+                                             GParamSpec *pspec) noexcept {
+    set (object, id, value, pspec);
+    update_latency (as<GstDmdSync> (object));
+  };
 }
 
 } // namespace codedexposure::gst::sync

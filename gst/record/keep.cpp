@@ -443,17 +443,9 @@ set_up (gpointer klass)
   transform_class->transform_ip = GST_DEBUG_FUNCPTR (transform_ip);
 }
 
-void
-set_up_instance (GstCodedExposureKeep *self)
-{
-  auto *base = GST_BASE_TRANSFORM (self);
-  gst_base_transform_set_passthrough (base, TRUE);
-  gst_base_transform_set_qos_enabled (base, FALSE);
-}
-
 } // namespace
 
 GST_ELEMENT_REGISTER_DEFINE (codedexposure_keep, "codedexposure-keep",
     GST_RANK_NONE,
-    (type_of<GstCodedExposureKeep, set_up, set_up_instance> (
+    (type_of<GstCodedExposureKeep, set_up, set_up_passing> (
         "GstCodedExposureKeep", GST_TYPE_BASE_TRANSFORM)))

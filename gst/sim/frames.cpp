@@ -56,15 +56,13 @@ wanted_schedule (GstCodedExposureSim *self)
     if (std::optional<Schedule> programmed = stream.mirrors->schedule ())
       return std::make_shared<const Schedule> (*std::move (programmed));
 
-  const std::shared_ptr<const Result<Schedule>> parsed =
-      locked (self, [&] { return state (self).settings.schedule.read; });
-  if (!parsed)
+  const Named<Schedule> named =
+      locked (self, [&] { return state (self).settings.schedule; });
+  if (!named.read)
     return std::make_shared<const Schedule> ();
-  if (parsed->ok ())
-    return ScheduleRef (parsed, &parsed->value ());
-  POST_ERROR (self, RESOURCE, SETTINGS,
-      "The schedule property cannot be read: " + parsed->error ().message);
-  return nullptr;
+  if (!check_named (self, "schedule", named))
+    return nullptr;
+  return ScheduleRef (named.read, &named.read->value ());
 }
 
 GstClockTime
@@ -430,9 +428,8 @@ begin_stream (GstCodedExposureSim *self)
     return std::tuple (settings.dmd, settings.bench, settings.beam);
   });
   stream.beam = beam;
-  if (bench.read && !*bench.read)
-    return refuse_settings (self,
-        "The bench property cannot be read: " + bench.read->error ().message);
+  if (!check_named (self, "bench", bench))
+    return false;
   if (bench.read)
     stream.profile = bench.read->value ().of_beam (beam == Beam::kOff);
   if (!dmd.empty () && !(stream.mirrors = find_mirrors (dmd)))

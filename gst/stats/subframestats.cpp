@@ -305,16 +305,8 @@ set_up (gpointer klass)
   transform_class->generate_output = GST_DEBUG_FUNCPTR (generate_output);
 }
 
-void
-set_up_instance (GstSubframeStats *self)
-{
-  auto *base = GST_BASE_TRANSFORM (self);
-  gst_base_transform_set_passthrough (base, TRUE);
-  gst_base_transform_set_qos_enabled (base, FALSE);
-}
-
 } // namespace
 
 GST_ELEMENT_REGISTER_DEFINE (subframestats, "subframestats", GST_RANK_NONE,
-    (type_of<GstSubframeStats, set_up, set_up_instance> (
+    (type_of<GstSubframeStats, set_up, set_up_passing> (
         "GstSubframeStats", GST_TYPE_BASE_TRANSFORM)))

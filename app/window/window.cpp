@@ -10,6 +10,7 @@
 
 #include "common/element.h"
 #include "common/kept_frame.h"
+#include "common/meta.h"
 #include "pipeline/messages.h"
 #include "window/pane.h"
 #include "window/screen.h"

@@ -47,13 +47,8 @@ struct Book {
   std::mutex lock;
   std::deque<Note> notes; ///< the last ones
   std::map<const void *, Reader> readers;
-
-  static Book &get ()
-  {
-    static Book book;
-    return book;
-  }
 };
+Book book;
 
 } // namespace
 
@@ -110,7 +105,6 @@ void
 SeekBook::note (const void *by, guint32 seqnum, const SeekRequest &request)
 {
   constexpr std::size_t kKept = 64;
-  Book &book = Book::get ();
   const std::lock_guard lock (book.lock);
   book.notes.push_back ({by, seqnum, request});
   if (book.notes.size () > kKept)
@@ -120,7 +114,6 @@ SeekBook::note (const void *by, guint32 seqnum, const SeekRequest &request)
 std::optional<SeekRequest>
 SeekBook::find (const void *by, guint32 seqnum)
 {
-  Book &book = Book::get ();
   const std::lock_guard lock (book.lock);
   const Book::Note *found = nullptr;
   for (const Book::Note &note : book.notes)
@@ -132,7 +125,6 @@ SeekBook::find (const void *by, guint32 seqnum)
 void
 SeekBook::read (const void *by, const std::string &stream, Reach reach)
 {
-  Book &book = Book::get ();
   const std::lock_guard lock (book.lock);
   book.readers.insert_or_assign (by, Book::Reader{stream, reach});
 }
@@ -140,7 +132,6 @@ SeekBook::read (const void *by, const std::string &stream, Reach reach)
 void
 SeekBook::forget (const void *by)
 {
-  Book &book = Book::get ();
   const std::lock_guard lock (book.lock);
   book.readers.erase (by);
   std::erase_if (
@@ -150,7 +141,6 @@ SeekBook::forget (const void *by)
 Reach
 SeekBook::reach (const void *by)
 {
-  Book &book = Book::get ();
   const std::lock_guard lock (book.lock);
   Reach most;
   const auto own = book.readers.find (by);

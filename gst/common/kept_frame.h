@@ -2,9 +2,6 @@
 /* Frames that are kept for later. */
 #pragma once
 
-#include <algorithm>
-
-#include "meta.h"
 #include "partner.h"
 #include "raii.h"
 
@@ -34,17 +31,6 @@ bytes_of (GstBuffer *frame)
   const auto partner = get_partner (frame);
   return gst_buffer_get_size (frame) +
          (partner ? gst_buffer_get_size (partner->buffer.get ()) : 0);
-}
-
-/** Significant bits of the pixels of @p frame: @p set unless that is 0, else
- * what its metadata say, else all of @p info. */
-inline int
-bits_of (GstBuffer *frame, const GstVideoInfo &info, int set)
-{
-  const auto meta = get_frame_meta (frame);
-  const int depth = int (GST_VIDEO_INFO_COMP_DEPTH (&info, 0));
-  const int bits = set > 0 ? set : meta ? meta->bits : 0;
-  return bits > 0 ? std::min (bits, depth) : depth;
 }
 
 } // namespace codedexposure::gst

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "meta.h"
 
+#include <algorithm>
+
 namespace codedexposure::gst
 {
 
@@ -122,6 +124,15 @@ get_frame_meta (GstBuffer *buffer)
   read_fields (structure, meta);
   get_field (structure, pattern_quark (), meta.pattern);
   return meta;
+}
+
+int
+bits_of (GstBuffer *frame, const GstVideoInfo &info, int set, int tagged)
+{
+  const auto meta = get_frame_meta (frame);
+  const int depth = int (GST_VIDEO_INFO_COMP_DEPTH (&info, 0));
+  const int bits = set > 0 ? set : meta ? meta->bits : tagged;
+  return bits > 0 ? std::min (bits, depth) : depth;
 }
 
 void

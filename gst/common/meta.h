@@ -88,6 +88,10 @@ void register_meta (const char *name);
 void set_frame_meta (GstBuffer *buffer, const FrameMeta &meta);
 std::optional<FrameMeta> get_frame_meta (GstBuffer *buffer);
 
+/** Significant bits of the pixels of @p frame: @p set unless that is 0, else
+ * what its metadata say, else its tags, @p tagged, else all of @p info. */
+int bits_of (
+    GstBuffer *frame, const GstVideoInfo &info, int set, int tagged = 0);
 /** Its pixels are not the scene through the masks of the schedule. */
 inline bool
 shows_pattern (GstBuffer *frame)

@@ -53,6 +53,15 @@ Canvas::font (double size)
   cairo_set_font_size (cairo_.get (), size);
 }
 
+cairo_text_extents_t
+Canvas::extents_of (double size, const std::string &words)
+{
+  font (size);
+  cairo_text_extents_t extents;
+  cairo_text_extents (cairo_.get (), words.c_str (), &extents);
+  return extents;
+}
+
 void
 Canvas::text (Position at, double size, const std::string &words)
 {
@@ -65,9 +74,7 @@ Canvas::text (Position at, double size, const std::string &words)
 void
 Canvas::text_centred (Position at, double size, const std::string &words)
 {
-  font (size);
-  cairo_text_extents_t extents;
-  cairo_text_extents (cairo_.get (), words.c_str (), &extents);
+  const cairo_text_extents_t extents = extents_of (size, words);
   text ({at.x - extents.width / 2 - extents.x_bearing,
             at.y - extents.height / 2 - extents.y_bearing},
       size, words);
@@ -77,9 +84,7 @@ void
 Canvas::text_within (
     Position at, double size, double width, const std::string &words)
 {
-  font (size);
-  cairo_text_extents_t extents;
-  cairo_text_extents (cairo_.get (), words.c_str (), &extents);
+  const cairo_text_extents_t extents = extents_of (size, words);
   text (
       at, size * std::min (1.0, width / std::max (1.0, extents.width)), words);
 }
@@ -87,9 +92,7 @@ Canvas::text_within (
 void
 Canvas::label (Position at, double size, const std::string &words)
 {
-  font (size);
-  cairo_text_extents_t extents;
-  cairo_text_extents (cairo_.get (), words.c_str (), &extents);
+  const cairo_text_extents_t extents = extents_of (size, words);
   cairo_save (cairo_.get ());
   cairo_set_operator (cairo_.get (), CAIRO_OPERATOR_CLEAR);
   cairo_rectangle (cairo_.get (), at.x - size / 3, at.y - size,

@@ -52,6 +52,7 @@ public:
 private:
   void head (Position at, double angle);
   void font (double size);
+  cairo_text_extents_t extents_of (double size, const std::string &words);
   /** Draws what was outlined. */
   void ink (bool filled);
 

@@ -49,6 +49,7 @@
 #include "common/elements.h"
 #include "common/kept_frame.h"
 #include "common/messages.h"
+#include "common/meta.h"
 #include "common/tag.h"
 #include "kept_file.h"
 #include "parts.h"
@@ -238,9 +239,8 @@ watch (GstCodedExposureKeep *self, GstBuffer *frame)
   MappedFrame mapped (*state.info, frame, GST_MAP_READ);
   if (!mapped)
     return state.events->skip ();
-  const int set = state.in_force.bits;
-  const int bits = set > 0 || meta ? set : state.tagged_bits;
-  const int largest = largest_pixel (bits_of (frame, *state.info, bits));
+  const int largest = largest_pixel (
+      bits_of (frame, *state.info, state.in_force.bits, state.tagged_bits));
   const auto jump = read_pixels (mapped,
       [&] (auto pixels) { return state.events->add (pixels, largest); });
   if (jump)

@@ -7,6 +7,7 @@
 
 #include "common/element.h"
 #include "common/kept_frame.h"
+#include "common/meta.h"
 #include "common/tag.h"
 #include "parts.h"
 

@@ -82,13 +82,10 @@ widen_rate (GstStructure *structure, GstPadDirection made_for)
 bool
 allows_rate (const GstStructure *structure, int num, int den)
 {
-  const GValue *allowed = gst_structure_get_value (structure, "framerate");
-  GValue rate = G_VALUE_INIT;
-  g_value_init (&rate, GST_TYPE_FRACTION);
-  gst_value_set_fraction (&rate, num, den);
-  const bool allows = !allowed || gst_value_intersect (nullptr, &rate, allowed);
-  g_value_unset (&rate);
-  return allows;
+  const StructurePtr rate (
+      gst_structure_new (gst_structure_get_name (structure), "framerate",
+          GST_TYPE_FRACTION, num, den, nullptr));
+  return gst_structure_can_intersect (structure, rate.get ());
 }
 
 /* How many input frames make a coded frame: a whole multiple of the slots. */

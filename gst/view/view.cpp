@@ -50,12 +50,11 @@ struct ViewState {
 struct GstCodedExposureView : Instance<GstVideoFilter, ViewState> {
 };
 
-constexpr int kShown = 8, kWhite = 255;
+constexpr int kWhite = 255;
 
-/** The pixel value of @p picture, whose format has @p depth bits, that becomes
- * white. */
+/** The pixel value of @p picture that becomes white. */
 guint64
-white_of (GstCodedExposureView *self, GstBuffer *picture, int depth)
+white_of (GstCodedExposureView *self, GstBuffer *picture)
 {
   int bits, white;
   locked (self, [&] {
@@ -64,11 +63,9 @@ white_of (GstCodedExposureView *self, GstBuffer *picture, int depth)
   });
   if (white > 0)
     return guint64 (white);
-  if (bits == 0) {
-    const auto meta = get_frame_meta (picture);
-    bits = meta ? meta->bits : self->state.tagged_bits;
-  }
-  return guint64 (largest_pixel (bits <= 0 ? depth : std::min (bits, depth)));
+  const GstVideoInfo &info = GST_VIDEO_FILTER (self)->in_info;
+  return guint64 (
+      largest_pixel (bits_of (picture, info, bits, self->state.tagged_bits)));
 }
 
 /** 0 to black, @p white and more to 255. */
@@ -114,7 +111,7 @@ before_transform (GstBaseTransform *base, GstBuffer *picture)
   auto *self = as<GstCodedExposureView> (base);
   const GstVideoInfo &in = GST_VIDEO_FILTER (base)->in_info;
   const bool as_it_is = GST_VIDEO_INFO_FORMAT (&in) == GST_VIDEO_FORMAT_GRAY8 &&
-                        white_of (self, picture, kShown) == kWhite;
+                        white_of (self, picture) == kWhite;
   gst_base_transform_set_passthrough (base, as_it_is);
 }
 
@@ -132,8 +129,7 @@ transform (GstBaseTransform *base, GstBuffer *picture, GstBuffer *shown)
   MappedFrame to (out, shown, GST_MAP_WRITE);
   if (!to)
     return refuse_buffer (self, out, shown);
-  const guint64 white =
-      white_of (self, picture, int (GST_VIDEO_INFO_COMP_DEPTH (&in, 0)));
+  const guint64 white = white_of (self, picture);
   read_pixels (
       from, [&] (auto pixels) { show (pixels, white, view_of<guint8> (to)); });
   if (auto meta = get_frame_meta (shown)) {

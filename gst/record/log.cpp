@@ -362,6 +362,7 @@ begin_run (GstElement *element)
   LogState &state = self->state;
   state.setup.reset ();
   state.setups.clear ();
+  state.said_partner = false;
   state.partners.restart ();
   restart_track (state, true);
   if (!begin_anew (self))

@@ -385,12 +385,18 @@ TEST_F (RecordPairs, ASecondCameraThatComesLaterIsSaidNotToBeRecorded)
       &camera, nullptr);
   Said said;
   said.follow (pipeline, "camera");
-  ASSERT_EQ (pipeline.play (), "");
-  EXPECT_NE (said.warning.find ("The second camera came after the first "
-                                "frame"),
-      std::string::npos);
-  EXPECT_EQ (camera.frames, 10);
-  EXPECT_EQ (counter_of (pipeline["recorder"].get (), "frames-lost"), 8u);
+  for (int run = 0; run < 2; run++) {
+    camera = {};
+    said = {};
+    ASSERT_EQ (pipeline.play (), "");
+    EXPECT_NE (said.warning.find ("The second camera came after the first "
+                                  "frame"),
+        std::string::npos)
+        << run;
+    EXPECT_EQ (camera.frames, 10);
+    EXPECT_EQ (counter_of (pipeline["recorder"].get (), "frames-lost"), 8u);
+    gst_element_set_state (top_of (pipeline, "camera").get (), GST_STATE_READY);
+  }
 }
 
 } // namespace

@@ -344,8 +344,20 @@ update_caps (GstAggregator *aggregator, GstCaps *, GstCaps **made)
   return *made ? GST_FLOW_OK : GST_AGGREGATOR_FLOW_NEED_DATA;
 }
 
-/* In the order of the frames of @pad. */
-void
+/* The frames of a pad are of the other beam. Returns false. */
+bool
+refuse_beam (GstCodedExposurePair *self, bool on)
+{
+  POST_ERROR (self, STREAM, WRONG_TYPE,
+      std::string ("The frames of pad ") + (on ? "on" : "off") +
+          " are of the beam of the mirrors that are " + (on ? "off" : "on") +
+          ". Link them to pad " + (on ? "off" : "on") + ".");
+  state (self).refused = true;
+  return false;
+}
+
+/* In the order of the frames of a pad. False if they are refused. */
+bool
 follow (GstCodedExposurePair *self, bool on, GstEvent *event)
 {
   PairState &st = state (self);
@@ -371,6 +383,8 @@ follow (GstCodedExposurePair *self, bool on, GstEvent *event)
     break;
   case GST_EVENT_TAG:
     if (const auto setup = setup_from_tags (tags_of (event)); setup && *setup) {
+      if (setup->value ().off_beam == on)
+        return refuse_beam (self, on);
       (on ? st.on_setup : st.off_setup) = setup->value ();
       st.set_due ();
     } else if (on) {
@@ -384,24 +398,7 @@ follow (GstCodedExposurePair *self, bool on, GstEvent *event)
   default:
     break;
   }
-}
-
-/* False, with an error on the bus, if the frames of @pad are of the other
- * beam. */
-bool
-check_beam (GstCodedExposurePair *self, bool on, GstEvent *event)
-{
-  const auto setup = GST_EVENT_TYPE (event) == GST_EVENT_TAG
-                         ? setup_from_tags (tags_of (event))
-                         : std::nullopt;
-  if (!setup || !*setup || setup->value ().off_beam != on)
-    return true;
-  POST_ERROR (self, STREAM, WRONG_TYPE,
-      std::string ("The frames of pad ") + (on ? "on" : "off") +
-          " are of the beam of the mirrors that are " + (on ? "off" : "on") +
-          ". Link them to pad " + (on ? "off" : "on") + ".");
-  state (self).refused = true;
-  return false;
+  return true;
 }
 
 gboolean
@@ -409,11 +406,10 @@ sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstEvent *event)
 {
   auto *self = as<GstCodedExposurePair> (aggregator);
   const bool on = pad == sink (self, "on");
-  if (!check_beam (self, on, event)) {
+  if (!follow (self, on, event)) {
     gst_event_unref (event);
     return FALSE;
   }
-  follow (self, on, event);
   switch (GST_EVENT_TYPE (event)) {
   case GST_EVENT_STREAM_START:
   case GST_EVENT_SEGMENT:

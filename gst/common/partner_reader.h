@@ -48,9 +48,4 @@ private:
   Scratch rectified_;
 };
 
-extern template Result<std::optional<ImageView<const std::uint8_t>>>
-PartnerReader::read (GstBuffer *, int, Workers *, Image<float> *);
-extern template Result<std::optional<ImageView<const std::uint16_t>>>
-PartnerReader::read (GstBuffer *, int, Workers *, Image<float> *);
-
 } // namespace codedexposure::gst

@@ -113,13 +113,8 @@ struct Stream {
   bool warned_tag = false;
   int unproven = 0; ///< frames in a row whose pilot did not show the phase
   bool warned_pilot = false;
-  /* Of the tags from upstream. */
-  std::optional<Mapping> mapping;
-  std::optional<BenchProfile> bench;
-  bool simulated = false;
-  bool off_beam = false; ///< of the camera, as the property or its tag says
-  int bits = 0;          ///< that upstream's tag has
-  std::string refused;   ///< the error of the caps that were refused last
+  StreamSetup upstream; ///< as its tag says; its schedule does not count
+  std::string refused;  ///< the error of the caps that were refused last
 };
 
 /** The object lock of the element is never held while pushing, querying or

@@ -65,10 +65,10 @@ make_timebase (GstCaps *caps, const SyncState &st)
   const PhaseWatch watch (st.schedule, time.info.width, time.info.height);
   if (st.schedule.pilot_rows () > 0 && !watch.complete ())
     return Error{
-        "frames of " + std::to_string (time.info.width) + "x" +
-        std::to_string (time.info.height) + " cannot hold the pilot of " +
-        st.schedule.text () + ", which is " + std::to_string (kPilotColumns) +
-        " pixels wide and " + std::to_string (st.schedule.pilot_rows ()) +
+        "frames of " + size_text ({time.info.width, time.info.height}) +
+        " cannot hold the pilot of " + st.schedule.text () + ", which is " +
+        std::to_string (kPilotColumns) + " pixels wide and " +
+        std::to_string (st.schedule.pilot_rows ()) +
         " rows high; use larger frames, or a schedule without pilot"};
   return time;
 }
@@ -99,14 +99,14 @@ StreamSetup
 own_setup (GstDmdSync *self)
 {
   SyncState &st = state (self);
-  StreamSetup setup = setup_at (
-      GST_BASE_TRANSFORM_SRC_PAD (self), st.schedule, st.stream.mapping);
-  setup.simulated = st.stream.simulated;
+  const StreamSetup &theirs = st.stream.upstream;
+  StreamSetup setup =
+      setup_at (GST_BASE_TRANSFORM_SRC_PAD (self), st.schedule, theirs.mapping);
+  setup.simulated = theirs.simulated;
   setup.off_beam = is_off_beam (self);
   const auto &frames = st.stream.frames;
-  setup.bits =
-      frames && frames->knows_bits () ? frames->bits () : st.stream.bits;
-  setup.bench = st.stream.bench ? st.stream.bench : st.bench;
+  setup.bits = frames && frames->knows_bits () ? frames->bits () : theirs.bits;
+  setup.bench = theirs.bench ? theirs.bench : st.bench;
   return setup;
 }
 
@@ -125,11 +125,7 @@ take_bench (GstDmdSync *self, const StreamSetup &theirs)
 {
   SyncState &st = state (self);
   const int black = black_level (st);
-  st.stream.mapping = theirs.mapping;
-  st.stream.simulated = theirs.simulated;
-  st.stream.off_beam = theirs.off_beam;
-  st.stream.bits = theirs.bits;
-  st.stream.bench = theirs.bench;
+  st.stream.upstream = theirs;
   if (st.stream.time && black != black_level (st))
     begin_phase (self);
   if (st.bench && theirs.bench)
@@ -227,7 +223,8 @@ refuse (GstDmdSync *self, GstCaps *incaps, const std::string &why)
 int
 black_level (const SyncState &st)
 {
-  const auto &bench = st.stream.bench ? st.stream.bench : st.bench;
+  const auto &theirs = st.stream.upstream.bench;
+  const auto &bench = theirs ? theirs : st.bench;
   return bench ? bench->black () : 0;
 }
 
@@ -236,7 +233,7 @@ is_off_beam (GstDmdSync *self)
 {
   const SyncState &st = state (self);
   return locked (self, [&] { return st.settings.beam; }) == Beam::kOff ||
-         st.stream.off_beam;
+         st.stream.upstream.off_beam;
 }
 
 void

@@ -161,18 +161,15 @@ check_mirrors (GstCodedExposureSim *self, const SimulatedMirrors &mirrors)
 {
   const GstVideoInfo &info = state (self).stream.plan->in;
   const std::optional<Extent> size = mirrors.size ();
-  const auto text = [] (int width, int height) {
-    return std::to_string (width) + "x" + std::to_string (height);
-  };
   if (!size || mirrors.diamond () ||
       (size->width >= info.width && size->height >= info.height))
     return true;
-  return refuse_settings (self,
-      "The simulated DMD has " + text (size->width, size->height) +
-          " mirrors, but the scene has " + text (info.width, info.height) +
-          " pixels, and each needs a mirror; set size=" +
-          text (info.width, info.height) +
-          " of its device, or leave the size out.");
+  const std::string scene = size_text ({info.width, info.height});
+  return refuse_settings (
+      self, "The simulated DMD has " + size_text (*size) +
+                " mirrors, but the scene has " + scene +
+                " pixels, and each needs a mirror; set size=" + scene +
+                " of its device, or leave the size out.");
 }
 
 /* Whether the profile, if there is one, is of a camera with such frames; @bits:

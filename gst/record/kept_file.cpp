@@ -153,9 +153,12 @@ write_kept (KeptFrames frames, const std::string &begin)
 {
   const std::string name = name_of (begin, frames.buffers.front ().get ());
   Part recording (name, Part::kFile), sidecar (sidecar_of (name), Part::kFile);
-  for (Part *part : {&recording, &sidecar})
-    if (const auto claimed = part->claim (false); !claimed)
-      return claimed.error ();
+  if (const auto claimed = recording.claim (false); !claimed)
+    return claimed.error ();
+  if (const auto claimed = sidecar.claim (false); !claimed) {
+    recording.discard ();
+    return claimed.error ();
+  }
   const std::string failed =
       write (std::move (frames), recording.path (), sidecar.path ());
   Result<void> done = failed.empty ()

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-keep: what has just happened becomes a recording. */
+#include <climits>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -308,6 +309,19 @@ TEST_F (Keep, WhatCannotBeWrittenIsSaid)
       "cannot write /proc/none/event-frame000000.mkv: No such file or "
       "directory; choose a folder that you can write to.");
   EXPECT_EQ (property<guint64> (keep_->element (), "recordings"), 0u);
+}
+
+/* The name of the lines is longer by two letters. */
+TEST_F (Keep, WithoutItsLinesNothingIsLeftOfARecording)
+{
+  begin ();
+  const std::string name (NAME_MAX - sizeof "-frame000000.mkv.part" + 1, 'a');
+  g_object_set (keep_->element (), "location", file (name).c_str (), nullptr);
+  push_all (0, 3);
+  keep ();
+  end ();
+  EXPECT_NE (keep_->warning (), "");
+  EXPECT_EQ (files (), 0u);
 }
 
 TEST_F (Keep, AnEventThatIsNoneIsRefused)

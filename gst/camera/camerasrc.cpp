@@ -179,14 +179,8 @@ end_run (GstElement *element)
 
 constexpr StateHooks kRun{.open = check,
     .begin = begin_run,
-    .pause =
-        [] (GstElement *element) {
-          camera::stop_silent_camera (as<GstCodedExposureCameraSrc> (element));
-        },
-    .halt =
-        [] (GstElement *element) {
-          camera::end_watch (as<GstCodedExposureCameraSrc> (element));
-        },
+    .pause = camera::stop_silent_camera,
+    .halt = camera::end_watch,
     .end = end_run};
 
 void
@@ -209,7 +203,7 @@ send_event (GstElement *element, GstEvent *event)
   const auto push = [] (GstElement *source, gpointer end) {
     auto *self = as<GstCodedExposureCameraSrc> (source);
     camera::begin_end (self);
-    camera::stop_silent_camera (self);
+    camera::stop_silent_camera (source);
     gst_pad_push_event (pad_of (self->state.filter, "src").get (),
         gst_event_ref (GST_EVENT (end)));
   };

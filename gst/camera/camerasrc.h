@@ -87,7 +87,7 @@ GstPadProbeReturn take_answer (
 /* A camera that goes away. */
 void begin_watch (GstCodedExposureCameraSrc *self);
 /** Ends all tries; returns when nothing is done to aravissrc any more. */
-void end_watch (GstCodedExposureCameraSrc *self);
+void end_watch (GstElement *self);
 /** Whether the error @p message of a child is handled by a restart. */
 bool take_failure (GstCodedExposureCameraSrc *self, GstMessage *message);
 /** From now on, the end of aravissrc is no error. */
@@ -95,10 +95,10 @@ void begin_end (GstCodedExposureCameraSrc *self);
 /** Makes a camera stop that has sent no complete frame for a second, where the
  * build has Aravis. aravissrc waits for one with its object locked, so that the
  * state of the pipeline cannot change. Its own end follows in two seconds. */
-void stop_silent_camera (GstCodedExposureCameraSrc *self);
+void stop_silent_camera (GstElement *self);
 /** Takes the camera of aravissrc, for stop_silent_camera (), or lets go of it:
  * it is controlled by the one who holds it. */
-void keep_camera (GstCodedExposureCameraSrc *self, ObjectPtr<GObject> camera);
+void keep_camera (gpointer self, ObjectPtr<GObject> camera);
 /** Whether the camera is away. */
 bool is_away (GstCodedExposureCameraSrc *self);
 /** A frame came. @p silent  time since the one before. */

@@ -146,7 +146,7 @@ begin_watch (GstCodedExposureCameraSrc *self)
 }
 
 void
-end_watch (GstCodedExposureCameraSrc *self)
+end_watch (GstElement *self)
 {
   CameraState &st = state (self);
   std::jthread ended;
@@ -211,7 +211,7 @@ begin_end (GstCodedExposureCameraSrc *self)
 }
 
 void
-keep_camera (GstCodedExposureCameraSrc *self, ObjectPtr<GObject> camera)
+keep_camera (gpointer self, ObjectPtr<GObject> camera)
 {
   CameraState &st = state (self);
   const std::lock_guard guard (st.lock);
@@ -219,7 +219,7 @@ keep_camera (GstCodedExposureCameraSrc *self, ObjectPtr<GObject> camera)
 }
 
 void
-stop_silent_camera (GstCodedExposureCameraSrc *self)
+stop_silent_camera (GstElement *self)
 {
   constexpr std::chrono::seconds kSilence{1};
   CameraState &st = state (self);

@@ -130,7 +130,7 @@ runner_of (GstDmdSync *self)
 }
 
 void
-close_device (GstDmdSync *self)
+close_device (GstElement *self)
 {
   std::shared_ptr<DmdRunner> runner;
   const ObjectLock lock (self);
@@ -138,7 +138,7 @@ close_device (GstDmdSync *self)
 }
 
 void
-park (GstDmdSync *self)
+park (GstElement *self)
 {
   SyncState &st = state (self);
   if (!st.runner)

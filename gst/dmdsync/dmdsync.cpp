@@ -170,9 +170,9 @@ begin_run (GstDmdSync *self)
 }
 
 void
-forget_stream (GstDmdSync *self)
+forget_stream (GstElement *self)
 {
-  SyncState &st = self->state;
+  SyncState &st = sync::state (self);
   st.stream = sync::Stream ();
   const ObjectLock lock (self);
   st.time.reset ();
@@ -203,13 +203,9 @@ begin (GstElement *element)
 
 constexpr StateHooks kRun{.open = open,
     .begin = begin,
-    .halt = [] (GstElement *element) { sync::park (as<GstDmdSync> (element)); },
-    .end =
-        [] (GstElement *element) { forget_stream (as<GstDmdSync> (element)); },
-    .close =
-        [] (GstElement *element) {
-          sync::close_device (as<GstDmdSync> (element));
-        }};
+    .halt = sync::park,
+    .end = forget_stream,
+    .close = sync::close_device};
 
 void
 set_up (gpointer klass)

@@ -183,9 +183,9 @@ bool read_schedule (GstDmdSync *self);
 bool read_bench (GstDmdSync *self);
 bool open_device (GstDmdSync *self);
 /** Parks the mirrors, whatever they are at. */
-void park (GstDmdSync *self);
+void park (GstElement *self);
 /** Destroys the runner, or leaves that to whoever still holds it. */
-void close_device (GstDmdSync *self);
+void close_device (GstElement *self);
 /** For any thread: keeps the runner beyond a change of state. */
 std::shared_ptr<DmdRunner> runner_of (GstDmdSync *self);
 

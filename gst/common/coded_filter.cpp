@@ -218,14 +218,7 @@ CodedFilter::forget_stream ()
   caps_ = PadCaps ();
   ended_ = false;
   shared_.settings_changed = true;
-  shared_.schedule.reset ();
-  shared_.provenance.reset ();
-  shared_.assumed = false;
-  shared_.rectifies = false;
-  shared_.latency = 0;
-  shared_.period = 0;
-  shared_.last_seek = GST_SEQNUM_INVALID;
-  shared_.stop_asked = GST_CLOCK_TIME_NONE;
+  static_cast<InForce &> (shared_) = {};
 }
 
 void
@@ -244,6 +237,8 @@ CodedFilter::post_error (const std::string &why) const
 GstFlowReturn
 CodedFilter::post_decode_error (const Error &error) const
 {
+  if (error.code == ErrorCode::cancelled)
+    return GST_FLOW_FLUSHING;
   POST_ERROR (element_, STREAM, DECODE,
       "A coded frame could not be decoded: " + error.message + ".");
   return GST_FLOW_ERROR;

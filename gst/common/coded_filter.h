@@ -98,10 +98,6 @@ struct CodedFrame {
   GstClockTime pts () const { return GST_BUFFER_PTS (buffer.get ()); }
   /** PTS of its picture @p k of @p n. */
   GstClockTime pts_of (int k, int n, FrameRate rate) const;
-  bool has_flags (guint flags) const
-  {
-    return GST_BUFFER_FLAGS (buffer.get ()) & flags;
-  }
 };
 
 /** A picture made from a coded frame. */
@@ -276,7 +272,8 @@ protected:
   int significant_bits () const;
   /** Returns false. */
   bool post_error (const std::string &why) const;
-  /** Posts that a frame could not be decoded. Returns GST_FLOW_ERROR. */
+  /** Posts that a frame could not be decoded, and returns GST_FLOW_ERROR, or
+   * FLUSHING, without a message, if that was cancelled. */
   GstFlowReturn post_decode_error (const Error &error) const;
   void notify (const char *property) const;
 
@@ -315,12 +312,8 @@ protected:
   GstFlowReturn acquire_picture (GstCodedPad *pad, const GstVideoInfo &info,
       bool first, BufferPtr &buffer, MappedFrame &mapped) const;
 
-  /** What other threads set and read. */
-  struct Shared {
-    StatsNames names;
-    CodedSettings settings;
-    bool settings_changed = true;
-    CodedCounters counters;
+  /** What other threads read; reset from PAUSED to READY. */
+  struct InForce {
     ScheduleRef schedule; ///< in force; null before the first frame
     bool assumed = false; ///< the schedule is the default
     /** Of the pictures; null before the first frame. */
@@ -330,6 +323,13 @@ protected:
     guint32 last_seek = GST_SEQNUM_INVALID; ///< that went upstream
     GstClockTime stop_asked = GST_CLOCK_TIME_NONE;
     GstClockTime latency = 0; ///< added by frames that are held
+  };
+  /** And what they set. */
+  struct Shared : InForce {
+    StatsNames names;
+    CodedSettings settings;
+    bool settings_changed = true;
+    CodedCounters counters;
 
     StructurePtr stats () const;
   };

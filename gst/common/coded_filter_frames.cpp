@@ -375,7 +375,8 @@ CodedFilter::note_saturation (const CodedFrame &frame)
 {
   /* Noise makes a bright pixel saturate in one frame and not in the next. */
   constexpr GstClockTimeDiff kCalm = GST_SECOND;
-  if (frame.has_flags (GST_BUFFER_FLAG_GAP) || frame.place != Place::inside)
+  if (GST_BUFFER_FLAG_IS_SET (frame.buffer.get (), GST_BUFFER_FLAG_GAP) ||
+      frame.place != Place::inside)
     return;
   const GstClockTime pts = frame.pts ();
   Burst &burst = stream_.saturation;

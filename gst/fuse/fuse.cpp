@@ -147,14 +147,6 @@ Fuse::set_up_class (gpointer klass)
           .caps = GST_VIDEO_CAPS_MAKE ("GRAY16_LE")});
 }
 
-namespace
-{
-
-/* Flags of frames that others cannot be compared with. */
-constexpr guint kUnfit = GST_BUFFER_FLAG_CORRUPTED | GST_BUFFER_FLAG_GAP;
-
-} // namespace
-
 Fuse::Fuse (GstElement *element)
     : CodedFilter (element,
           {"application/x-codedexposure-fuse-stats", "frames-out", nullptr})
@@ -166,7 +158,7 @@ Fuse::Fuse (GstElement *element)
 GstFlowReturn
 Fuse::process (CodedFrame frame)
 {
-  const bool alone = frame.has_flags (kUnfit) || backwards ();
+  const bool alone = is_corrupted (frame.buffer.get ()) || backwards ();
   GstFlowReturn flow = GST_FLOW_OK;
   if (alone) {
     flow = drain ();
@@ -248,9 +240,7 @@ Fuse::take (CodedFrame frame)
                                ? take_pixels<std::uint16_t> (buffer, coded)
                                : take_pixels<std::uint8_t> (buffer, coded);
     if (!saturated)
-      return saturated.error ().code == ErrorCode::cancelled
-                 ? GST_FLOW_FLUSHING
-                 : post_decode_error (saturated.error ());
+      return post_decode_error (saturated.error ());
     frame.meta.saturated = *saturated;
   }
   note_saturation (frame);
@@ -307,9 +297,7 @@ Fuse::render (Pictures &fused, Pictures *uncertainty)
   if (done)
     return GST_FLOW_OK;
   fused.buffers.clear ();
-  return done.error ().code == ErrorCode::cancelled
-             ? GST_FLOW_FLUSHING
-             : post_decode_error (done.error ());
+  return post_decode_error (done.error ());
 }
 
 GstFlowReturn

@@ -395,11 +395,8 @@ properties ()
           "File to write, one line of JSON a coded frame; overwritten when it "
           "exists; empty: none",
           kReadWriteReady, &LogState::location},
-      {"counters", "Statistics",
-          "Counters: frames-lost, the coded frames, and those of a second "
-          "camera, that are missing before frames that came, by their numbers, "
-          "and the frames of a second camera that came too late to be recorded",
-          kReadOnly, stats_of}};
+      {"counters", "Statistics", "Those of codedexposure-recordmux", kReadOnly,
+          stats_of}};
 }
 
 constexpr StateHooks kRun{.begin = begin_run, .end = end_run};

@@ -532,10 +532,7 @@ properties ()
   return {
       {"tick", "Tick", "To which the container rounds times, ns", kReadWrite,
           &RestoreState::tick, guint64 (1), guint64 (GST_SECOND)},
-      {"counters", "Statistics",
-          "frames, frames-damaged (their pixels are not those that were "
-          "recorded), frames-unknown (without a line in the track), "
-          "frames-missing (in the track only), lines-damaged",
+      {"counters", "Statistics", "Those of codedexposure-recorddemux",
           kReadOnly, stats_of}};
 }
 

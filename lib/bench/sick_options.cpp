@@ -2,10 +2,11 @@
 #include "bench/sick_options.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <random>
-#include <vector>
+#include <type_traits>
 
 #include "base/pixels.h"
 #include "base/text.h"
@@ -18,18 +19,18 @@ namespace
 {
 
 using Bench = SickBenchOptions;
-using Values = std::vector<double>;
+/** The numbers of a word's value, at most two. */
+using Values = std::array<double, 2>;
 
-/** A number of a word's value, and what it may be. */
+/** What a number of a word's value may be. */
 struct Range {
-  enum class Kind { real, whole, time };
-  Kind kind = Kind::real;
-  double low = 0.0, high = 1.0;
+  double low, high;
+  enum class Kind { real, whole, time } kind = Kind::real;
 };
-constexpr Range kPart{Range::Kind::real, 0.0, 1.0};
-constexpr Range kAny{Range::Kind::real, -1e4, 1e4};
-constexpr Range kTime{Range::Kind::time, 0.0, 1e12};
-constexpr Range kCount{Range::Kind::whole, 0.0, 10'000.0};
+constexpr auto kWhole = Range::Kind::whole;
+constexpr Range kPart{0.0, 1.0}, kAny{-1e4, 1e4};
+constexpr Range kTime{0.0, 1e12, Range::Kind::time};
+constexpr Range kCount{0.0, 10'000.0, kWhole};
 
 /** A word of inflict (). */
 struct Word {
@@ -37,8 +38,23 @@ struct Word {
   const char *value; ///< for people: "HZ:DEPTH"; empty: it has none
   const char *usual; ///< taken where a word has no value
   const char *help;
-  std::vector<Range> ranges;
-  void (*set) (Bench &bench, const Values &values);
+  Range ranges[2] = {}; ///< of the numbers in the value
+  /** Null: others read the value, any text, from SickBenchOptions::parts. */
+  void (*set) (Bench &bench, const Values &values) = nullptr;
+};
+
+/** Sets members to numbers; what has no number is a flag, and becomes true. */
+template <auto... kMembers>
+constexpr auto put = [] (auto &whole, const Values &values) {
+  const double *value = values.data ();
+  ((whole.*kMembers =
+           std::remove_reference_t<decltype (whole.*kMembers)> (*value++)),
+      ...);
+};
+/** The same of a part of the bench. */
+template <auto kMember, auto... kMembers>
+constexpr auto put_in = [] (Bench &b, const Values &values) {
+  put<kMembers...> (b.*kMember, values);
 };
 
 Nanoseconds
@@ -54,295 +70,206 @@ scaled_black (const Bench &b, double level)
   return level * largest_pixel (b.bits) / 255.0;
 }
 
-std::vector<Word>
-words_of_parts ()
-{
-  const auto nothing = [] (Bench &, const Values &) {};
-  return {
-      {"healthy", "SEED", "1", "all numbers drawn from those of good benches",
-          {{Range::Kind::whole, 0.0, 1e9}},
-          [] (Bench &b, const Values &v) {
-            b = random_healthy_bench (std::uint64_t (v[0]), b);
-          }},
-      {"dmd-missing", "", "", "no board answers on the USB", {}, nothing},
-      {"dmd-busy", "", "", "another program uses the board", {}, nothing},
-      {"dmd-permission", "", "", "the user may not open the board", {},
-          nothing},
-      {"firmware", "VERSION", "3.0.0", "firmware that is too old", {}, nothing},
-      {"camera-missing", "", "", "no camera answers", {}, nothing},
-      {"test-image", "", "", "the camera sends a test picture", {}, nothing},
-      {"mute", "", "", "no feature tells how the camera is set", {}, nothing},
-      {"rolling-shutter", "TIME", "8ms",
-          "rows are exposed one after the other, for so long in all", {kTime},
-          [] (Bench &b, const Values &v) { b.rolling = ns (v[0]); }},
-      {"colour", "", "", "the sensor has a colour filter", {},
-          [] (Bench &b, const Values &) { b.colour = true; }},
-      {"gamma", "GAMMA", "0.45", "pixel values are a power of the light",
-          {{Range::Kind::real, 0.1, 4.0}},
-          [] (Bench &b, const Values &v) { b.gamma = v[0]; }},
-      {"auto-exposure", "LEVEL", "0.4", "the exposure keeps that mean level",
-          {kPart}, [] (Bench &b, const Values &v) { b.auto_exposure = v[0]; }},
-      {"auto-gain", "LEVEL", "0.4", "the gain keeps that mean level", {kPart},
-          [] (Bench &b, const Values &v) { b.auto_gain = v[0]; }},
-      {"black-clamp", "PART", "0.03",
-          "the black level falls by that part of the mean light", {kPart},
-          [] (Bench &b, const Values &v) { b.black_clamp = v[0]; }},
-      {"lut", "", "", "a look-up table changes pixel values", {},
-          [] (Bench &b, const Values &) { b.lut = true; }},
-      {"noise-reduction", "PART", "0.5", "pixels get part of a mean of 3x3",
-          {kPart},
-          [] (Bench &b, const Values &v) { b.noise_reduction = v[0]; }},
-      {"sharpening", "PART", "0.5", "differences from a mean of 3x3 grow",
-          {{Range::Kind::real, 0.0, 4.0}},
-          [] (Bench &b, const Values &v) { b.sharpening = v[0]; }},
-      {"dark-subtraction", "", "", "a dark frame is taken from each frame", {},
-          [] (Bench &b, const Values &) { b.dark_subtraction = true; }},
-      {"low-bits", "BITS", "12", "16 bits are sent, the lowest are used",
-          {{Range::Kind::whole, 8.0, 15.0}},
-          [] (Bench &b, const Values &v) {
-            b.low_bits = int (v[0]);
-            b.bits = 16;
-          }},
-      {"high-bits", "BITS", "12", "16 bits are sent, the highest are used",
-          {{Range::Kind::whole, 8.0, 15.0}},
-          [] (Bench &b, const Values &v) {
-            b.missing_bits = 16 - int (v[0]);
-            b.bits = 16;
-          }},
-      {"binning", "", "", "pixels are joined, 2 by 2", {},
-          [] (Bench &b, const Values &) {
-            b.alignment.scale *= 0.5;
-            b.mirrors.width *= 2;
-            b.mirrors.height *= 2;
-          }},
-      {"roi", "", "", "a part of the sensor is read", {}, nothing},
-      {"pixel-format", "", "", "fewer bits are sent than the sensor has", {},
-          nothing},
-      {"packet-size", "", "", "packets of 576 bytes", {}, nothing},
-      {"packet-loss", "PART", "0.02", "packets are lost on the network",
-          {kPart}, [] (Bench &b, const Values &v) { b.packet_loss = v[0]; }},
-      {"slow-disk", "", "", "the disk is slower than the camera", {}, nothing},
-  };
-}
+using T = Bench::Trigger;
+using A = Alignment;
 
-std::vector<Word>
-words_of_trigger ()
-{
-  using T = Bench::Trigger;
-  return {
-      {"no-trigger", "", "", "the trigger does not reach the camera", {},
-          [] (Bench &b, const Values &) { b.trigger = T::none; }},
-      {"free-running", "RATE", "24.7", "the camera ignores the trigger",
-          {{Range::Kind::real, 0.1, 10'000.0}},
-          [] (Bench &b, const Values &v) {
-            b.trigger = T::free_running;
-            b.free_rate = v[0];
-          }},
-      {"half-rate", "", "", "every other trigger is ignored", {},
-          [] (Bench &b, const Values &) { b.trigger = T::half_rate; }},
-      {"rate-limit", "", "", "the camera's own rate ignores early triggers", {},
-          [] (Bench &b, const Values &) { b.trigger = T::half_rate; }},
-      {"double-rate", "", "", "two frames come for each trigger", {},
-          [] (Bench &b, const Values &) { b.trigger = T::double_rate; }},
-      {"trigger-edge", "TIME", "20ms",
-          "the exposure begins with the end of a pulse of that length", {kTime},
-          [] (Bench &b, const Values &v) { b.edge = ns (v[0]); }},
-      {"exposure-late", "TIME", "2ms", "the exposure begins later", {kTime},
-          [] (Bench &b, const Values &v) { b.late = ns (v[0]); }},
-      {"exposure-short", "TIME", "4ms",
-          "the longest exposure ends that long before the period", {kTime},
-          [] (Bench &b, const Values &v) { b.ends_early = ns (v[0]); }},
-      {"exposure-long", "TIME", "2ms",
-          "the longest exposure ends that long after the period", {kTime},
-          [] (Bench &b, const Values &v) { b.ends_early = -ns (v[0]); }},
-      {"frame-late", "FRAMES", "1", "a frame has an earlier exposure",
-          {{Range::Kind::whole, 0.0, 16.0}},
-          [] (Bench &b, const Values &v) { b.frame_late = int (v[0]); }},
-      {"frame-late-varies", "", "", "the same, by 0 to 2 frames", {},
-          [] (Bench &b, const Values &) { b.late_varies = true; }},
-      {"jitter", "TIME", "200us", "jitter of the trigger's delay, rms", {kTime},
-          [] (Bench &b, const Values &v) { b.jitter = v[0]; }},
-      {"delay", "TIME", "50us", "from the trigger to the exposure", {kTime},
-          [] (Bench &b, const Values &v) { b.delay = ns (v[0]); }},
-      {"readout", "TIME", "100us", "time that no exposure covers", {kTime},
-          [] (Bench &b, const Values &v) { b.readout = ns (v[0]); }},
-  };
-}
-
-std::vector<Word>
-words_of_light ()
-{
-  return {
-      {"dark", "LEVEL", "0.03", "too little light; 1: saturation", {kPart},
-          [] (Bench &b, const Values &v) { b.level = v[0]; }},
-      {"bright", "LEVEL", "1.6", "too much light; 1: saturation",
-          {{Range::Kind::real, 0.0, 100.0}},
-          [] (Bench &b, const Values &v) { b.level = v[0]; }},
-      {"level", "LEVEL", "0.8", "light of all mirrors; 1: saturation",
-          {{Range::Kind::real, 0.0, 100.0}},
-          [] (Bench &b, const Values &v) { b.level = v[0]; }},
-      {"vignetting", "PART", "0.6", "light that a corner loses", {kPart},
-          [] (Bench &b, const Values &v) { b.vignetting = v[0]; }},
-      {"flicker", "HZ:DEPTH", "100:0.1", "amplitude / mean of the light",
-          {{Range::Kind::real, 0.01, 100'000.0}, kPart},
-          [] (Bench &b, const Values &v) {
-            b.flicker_rate = v[0];
-            b.flicker_depth = v[1];
-          }},
-      {"drift", "PART", "0.1", "change of the light in a minute",
-          {{Range::Kind::real, -1.0, 1.0}},
-          [] (Bench &b, const Values &v) { b.drift = v[0]; }},
-      {"pulsed", "HZ:PART", "1000:0.5", "the lamp is on for part of each pulse",
-          {{Range::Kind::real, 1.0, 1e6}, {Range::Kind::real, 0.001, 1.0}},
-          [] (Bench &b, const Values &v) {
-            b.pulse_rate = v[0];
-            b.pulse_duty = v[1];
-          }},
-      {"texture", "PART", "0.2", "the target is not uniform, rms",
-          {{Range::Kind::real, 0.0, 0.5}},
-          [] (Bench &b, const Values &v) { b.texture = v[0]; }},
-      {"moving", "SPEED", "5", "a target with texture moves, pixels/s",
-          {{Range::Kind::real, -1e4, 1e4}},
-          [] (Bench &b, const Values &v) {
-            b.moving = v[0];
-            b.texture = std::max (b.texture, 0.05);
-          }},
-  };
-}
-
-std::vector<Word>
-words_of_sensor ()
-{
-  return {
-      {"nonlinear", "PART", "0.05", "bow of the response, part of the range",
-          {{Range::Kind::real, -0.2, 0.2}},
-          [] (Bench &b, const Values &v) { b.nonlinear = v[0]; }},
-      {"noise", "ELECTRONS", "100", "read noise, e- rms",
-          {{Range::Kind::real, 0.0, 1e5}},
-          [] (Bench &b, const Values &v) { b.read_noise = v[0]; }},
-      {"black-clipped", "DN", "2", "DN of 8 bits that black lies below 0",
-          {{Range::Kind::real, 0.0, 100.0}},
-          [] (Bench &b, const Values &v) {
-            b.black_level = -scaled_black (b, v[0]);
-          }},
-      {"hot-pixels", "N", "200", "pixels with a dark current", {kCount},
-          [] (Bench &b, const Values &v) { b.hot_pixels = int (v[0]); }},
-      {"dead-pixels", "N", "200", "pixels that see nothing", {kCount},
-          [] (Bench &b, const Values &v) { b.dead_pixels = int (v[0]); }},
-      {"missing-bits", "N", "2", "lowest bits that are always 0",
-          {{Range::Kind::whole, 0.0, 8.0}},
-          [] (Bench &b, const Values &v) { b.missing_bits = int (v[0]); }},
-      {"dead-rows", "N", "2", "rows of pixels that see nothing", {kCount},
-          [] (Bench &b, const Values &v) { b.dead_rows = int (v[0]); }},
-      {"dead-blocks", "N", "1", "16x16 pixels that see nothing", {kCount},
-          [] (Bench &b, const Values &v) { b.dead_blocks = int (v[0]); }},
-      {"full-well", "ELECTRONS", "10000", "electrons at saturation",
-          {{Range::Kind::real, 1.0, 1e7}},
-          [] (Bench &b, const Values &v) { b.full_well = v[0]; }},
-      {"black", "DN", "4", "black level, DN of 8 bits",
-          {{Range::Kind::real, 0.0, 100.0}},
-          [] (Bench &b, const Values &v) {
-            b.black_level = scaled_black (b, v[0]);
-          }},
-      {"prnu", "PART", "0.01", "rms difference of sensitivity", {kPart},
-          [] (Bench &b, const Values &v) { b.prnu = v[0]; }},
-  };
-}
-
-std::vector<Word>
-words_of_mirrors ()
-{
-  return {
-      {"leak", "PART", "0.03", "light of mirrors that are off", {kPart},
-          [] (Bench &b, const Values &v) { b.leak = v[0]; }},
-      {"slow-mirrors", "TIME", "500us", "time of a transition", {kTime},
-          [] (Bench &b, const Values &v) { b.switching = ns (v[0]); }},
-      {"stuck-on", "N", "20", "mirrors that stay on", {kCount},
-          [] (Bench &b, const Values &v) { b.stuck_on = int (v[0]); }},
-      {"stuck-off", "N", "20", "mirrors that stay off", {kCount},
-          [] (Bench &b, const Values &v) { b.stuck_off = int (v[0]); }},
-      {"stuck-rows", "N", "2", "rows of mirrors that stay off", {kCount},
-          [] (Bench &b, const Values &v) { b.stuck_rows = int (v[0]); }},
-      {"stuck-blocks", "N", "1", "16x16 mirrors that stay off", {kCount},
-          [] (Bench &b, const Values &v) { b.stuck_blocks = int (v[0]); }},
-      {"flipped-x", "", "", "the picture is mirrored, left to right", {},
-          [] (Bench &b, const Values &) { b.orientation.flipped_x = true; }},
-      {"flipped-y", "", "", "the picture is mirrored, top to bottom", {},
-          [] (Bench &b, const Values &) { b.orientation.flipped_y = true; }},
-      {"turned", "90|180|270", "90", "the camera is turned, degrees",
-          {{Range::Kind::whole, 90.0, 270.0}},
-          [] (Bench &b, const Values &v) {
-            b.orientation.turned = int (v[0]) / 90 * 90;
-          }},
-  };
-}
-
-std::vector<Word>
-words_of_optics ()
-{
-  return {
-      {"blur", "PIXELS", "3", "standard deviation of the blur",
-          {{Range::Kind::real, 0.0, 16.0}},
-          [] (Bench &b, const Values &v) { b.blur = v[0]; }},
-      {"focus-tilt", "PIXELS:DEGREES", "3:30",
-          "blur that grows across the frame, towards that direction",
-          {{Range::Kind::real, 0.0, 16.0}, kAny},
-          [] (Bench &b, const Values &v) {
-            b.focus_tilt = v[0];
-            b.focus_direction = v[1];
-          }},
-      {"perspective", "X/Y", "0.03/0.02", "tilt of the mirrors",
-          {{Range::Kind::real, -0.3, 0.3}, {Range::Kind::real, -0.3, 0.3}},
-          [] (Bench &b, const Values &v) {
-            b.alignment.tilt_x = v[0];
-            b.alignment.tilt_y = v[1];
-          }},
-      {"distortion", "PART", "0.02", "radial shift of a corner",
-          {{Range::Kind::real, -0.1, 0.1}},
-          [] (Bench &b, const Values &v) { b.alignment.distortion = v[0]; }},
-      {"rotation", "DEGREES", "4", "of the camera",
-          {{Range::Kind::real, -45.0, 45.0}},
-          [] (Bench &b, const Values &v) { b.alignment.rotation = v[0]; }},
-      {"scale", "PIXELS", "1.1", "pixels for each mirror",
-          {{Range::Kind::real, 0.5, 4.0}},
-          [] (Bench &b, const Values &v) { b.alignment.scale = v[0]; }},
-      {"shift", "X/Y", "100/0", "of the camera, mirrors", {kAny, kAny},
-          [] (Bench &b, const Values &v) {
-            b.alignment.shift_x = v[0];
-            b.alignment.shift_y = v[1];
-          }},
-      {"dust", "N", "6", "spots that block light", {kCount},
-          [] (Bench &b, const Values &v) { b.dust = int (v[0]); }},
-  };
-}
-
-std::vector<Word>
-words_of_frames ()
-{
-  return {
-      {"lose", "PART", "0.05", "frames that are lost", {kPart},
-          [] (Bench &b, const Values &v) { b.lose = v[0]; }},
-      {"slip", "TIME", "7s", "the masks come a slot later that often", {kTime},
-          [] (Bench &b, const Values &v) { b.slip_every = ns (v[0]); }},
-      {"frame-jitter", "TIME", "30ms", "max delay of a frame on its way",
-          {kTime},
-          [] (Bench &b, const Values &v) { b.frame_jitter = ns (v[0]); }},
-  };
-}
-
-const std::vector<Word> &
-all_words ()
-{
-  static const std::vector<Word> words = [] {
-    std::vector<Word> all = words_of_parts ();
-    for (const auto &more :
-        {words_of_trigger (), words_of_light (), words_of_sensor (),
-            words_of_mirrors (), words_of_optics (), words_of_frames ()})
-      all.insert (all.end (), more.begin (), more.end ());
-    return all;
-  }();
-  return words;
-}
+constexpr Word kWords[] = {
+    /* Parts. */
+    {"healthy", "SEED", "1", "all numbers drawn from those of good benches",
+        {{0.0, 1e9, kWhole}},
+        [] (Bench &b, const Values &v) {
+          b = random_healthy_bench (std::uint64_t (v[0]), b);
+        }},
+    {"dmd-missing", "", "", "no board answers on the USB"},
+    {"dmd-busy", "", "", "another program uses the board"},
+    {"dmd-permission", "", "", "the user may not open the board"},
+    {"firmware", "VERSION", "3.0.0", "firmware that is too old"},
+    {"camera-missing", "", "", "no camera answers"},
+    {"test-image", "", "", "the camera sends a test picture"},
+    {"mute", "", "", "no feature tells how the camera is set"},
+    {"rolling-shutter", "TIME", "8ms",
+        "rows are exposed one after the other, for so long in all", {kTime},
+        put<&Bench::rolling>},
+    {"colour", "", "", "the sensor has a colour filter", {},
+        put<&Bench::colour>},
+    {"gamma", "GAMMA", "0.45", "pixel values are a power of the light",
+        {{0.1, 4.0}}, put<&Bench::gamma>},
+    {"auto-exposure", "LEVEL", "0.4", "the exposure keeps that mean level",
+        {kPart}, put<&Bench::auto_exposure>},
+    {"auto-gain", "LEVEL", "0.4", "the gain keeps that mean level", {kPart},
+        put<&Bench::auto_gain>},
+    {"black-clamp", "PART", "0.03",
+        "the black level falls by that part of the mean light", {kPart},
+        put<&Bench::black_clamp>},
+    {"lut", "", "", "a look-up table changes pixel values", {},
+        put<&Bench::lut>},
+    {"noise-reduction", "PART", "0.5", "pixels get part of a mean of 3x3",
+        {kPart}, put<&Bench::noise_reduction>},
+    {"sharpening", "PART", "0.5", "differences from a mean of 3x3 grow",
+        {{0.0, 4.0}}, put<&Bench::sharpening>},
+    {"dark-subtraction", "", "", "a dark frame is taken from each frame", {},
+        put<&Bench::dark_subtraction>},
+    {"low-bits", "BITS", "12", "16 bits are sent, the lowest are used",
+        {{8.0, 15.0, kWhole}},
+        [] (Bench &b, const Values &v) {
+          b.low_bits = int (v[0]);
+          b.bits = 16;
+        }},
+    {"high-bits", "BITS", "12", "16 bits are sent, the highest are used",
+        {{8.0, 15.0, kWhole}},
+        [] (Bench &b, const Values &v) {
+          b.missing_bits = 16 - int (v[0]);
+          b.bits = 16;
+        }},
+    {"binning", "", "", "pixels are joined, 2 by 2", {},
+        [] (Bench &b, const Values &) {
+          b.alignment.scale *= 0.5;
+          b.mirrors.width *= 2;
+          b.mirrors.height *= 2;
+        }},
+    {"roi", "", "", "a part of the sensor is read"},
+    {"pixel-format", "", "", "fewer bits are sent than the sensor has"},
+    {"packet-size", "", "", "packets of 576 bytes"},
+    {"packet-loss", "PART", "0.02", "packets are lost on the network", {kPart},
+        put<&Bench::packet_loss>},
+    {"slow-disk", "", "", "the disk is slower than the camera"},
+    /* Trigger and exposure. */
+    {"no-trigger", "", "", "the trigger does not reach the camera", {},
+        [] (Bench &b, const Values &) { b.trigger = T::none; }},
+    {"free-running", "RATE", "24.7", "the camera ignores the trigger",
+        {{0.1, 10'000.0}},
+        [] (Bench &b, const Values &v) {
+          b.trigger = T::free_running;
+          b.free_rate = v[0];
+        }},
+    {"half-rate", "", "", "every other trigger is ignored", {},
+        [] (Bench &b, const Values &) { b.trigger = T::half_rate; }},
+    {"rate-limit", "", "", "the camera's own rate ignores early triggers", {},
+        [] (Bench &b, const Values &) { b.trigger = T::half_rate; }},
+    {"double-rate", "", "", "two frames come for each trigger", {},
+        [] (Bench &b, const Values &) { b.trigger = T::double_rate; }},
+    {"trigger-edge", "TIME", "20ms",
+        "the exposure begins with the end of a pulse of that length", {kTime},
+        put<&Bench::edge>},
+    {"exposure-late", "TIME", "2ms", "the exposure begins later", {kTime},
+        put<&Bench::late>},
+    {"exposure-short", "TIME", "4ms",
+        "the longest exposure ends that long before the period", {kTime},
+        put<&Bench::ends_early>},
+    {"exposure-long", "TIME", "2ms",
+        "the longest exposure ends that long after the period", {kTime},
+        [] (Bench &b, const Values &v) { b.ends_early = -ns (v[0]); }},
+    {"frame-late", "FRAMES", "1", "a frame has an earlier exposure",
+        {{0.0, 16.0, kWhole}}, put<&Bench::frame_late>},
+    {"frame-late-varies", "", "", "the same, by 0 to 2 frames", {},
+        put<&Bench::late_varies>},
+    {"jitter", "TIME", "200us", "jitter of the trigger's delay, rms", {kTime},
+        put<&Bench::jitter>},
+    {"delay", "TIME", "50us", "from the trigger to the exposure", {kTime},
+        put<&Bench::delay>},
+    {"readout", "TIME", "100us", "time that no exposure covers", {kTime},
+        put<&Bench::readout>},
+    /* Light. */
+    {"dark", "LEVEL", "0.03", "too little light; 1: saturation", {kPart},
+        put<&Bench::level>},
+    {"bright", "LEVEL", "1.6", "too much light; 1: saturation", {{0.0, 100.0}},
+        put<&Bench::level>},
+    {"level", "LEVEL", "0.8", "light of all mirrors; 1: saturation",
+        {{0.0, 100.0}}, put<&Bench::level>},
+    {"vignetting", "PART", "0.6", "light that a corner loses", {kPart},
+        put<&Bench::vignetting>},
+    {"flicker", "HZ:DEPTH", "100:0.1", "amplitude / mean of the light",
+        {{0.01, 100'000.0}, kPart},
+        put<&Bench::flicker_rate, &Bench::flicker_depth>},
+    {"drift", "PART", "0.1", "change of the light in a minute", {{-1.0, 1.0}},
+        put<&Bench::drift>},
+    {"pulsed", "HZ:PART", "1000:0.5", "the lamp is on for part of each pulse",
+        {{1.0, 1e6}, {0.001, 1.0}},
+        put<&Bench::pulse_rate, &Bench::pulse_duty>},
+    {"texture", "PART", "0.2", "the target is not uniform, rms", {{0.0, 0.5}},
+        put<&Bench::texture>},
+    {"moving", "SPEED", "5", "a target with texture moves, pixels/s",
+        {{-1e4, 1e4}},
+        [] (Bench &b, const Values &v) {
+          b.moving = v[0];
+          b.texture = std::max (b.texture, 0.05);
+        }},
+    /* Sensor. */
+    {"nonlinear", "PART", "0.05", "bow of the response, part of the range",
+        {{-0.2, 0.2}}, put<&Bench::nonlinear>},
+    {"noise", "ELECTRONS", "100", "read noise, e- rms", {{0.0, 1e5}},
+        put<&Bench::read_noise>},
+    {"black-clipped", "DN", "2", "DN of 8 bits that black lies below 0",
+        {{0.0, 100.0}},
+        [] (Bench &b, const Values &v) {
+          b.black_level = -scaled_black (b, v[0]);
+        }},
+    {"hot-pixels", "N", "200", "pixels with a dark current", {kCount},
+        put<&Bench::hot_pixels>},
+    {"dead-pixels", "N", "200", "pixels that see nothing", {kCount},
+        put<&Bench::dead_pixels>},
+    {"missing-bits", "N", "2", "lowest bits that are always 0",
+        {{0.0, 8.0, kWhole}}, put<&Bench::missing_bits>},
+    {"dead-rows", "N", "2", "rows of pixels that see nothing", {kCount},
+        put<&Bench::dead_rows>},
+    {"dead-blocks", "N", "1", "16x16 pixels that see nothing", {kCount},
+        put<&Bench::dead_blocks>},
+    {"full-well", "ELECTRONS", "10000", "electrons at saturation", {{1.0, 1e7}},
+        put<&Bench::full_well>},
+    {"black", "DN", "4", "black level, DN of 8 bits", {{0.0, 100.0}},
+        [] (Bench &b, const Values &v) {
+          b.black_level = scaled_black (b, v[0]);
+        }},
+    {"prnu", "PART", "0.01", "rms difference of sensitivity", {kPart},
+        put<&Bench::prnu>},
+    /* Mirrors. */
+    {"leak", "PART", "0.03", "light of mirrors that are off", {kPart},
+        put<&Bench::leak>},
+    {"slow-mirrors", "TIME", "500us", "time of a transition", {kTime},
+        put<&Bench::switching>},
+    {"stuck-on", "N", "20", "mirrors that stay on", {kCount},
+        put<&Bench::stuck_on>},
+    {"stuck-off", "N", "20", "mirrors that stay off", {kCount},
+        put<&Bench::stuck_off>},
+    {"stuck-rows", "N", "2", "rows of mirrors that stay off", {kCount},
+        put<&Bench::stuck_rows>},
+    {"stuck-blocks", "N", "1", "16x16 mirrors that stay off", {kCount},
+        put<&Bench::stuck_blocks>},
+    {"flipped-x", "", "", "the picture is mirrored, left to right", {},
+        put_in<&Bench::orientation, &Orientation::flipped_x>},
+    {"flipped-y", "", "", "the picture is mirrored, top to bottom", {},
+        put_in<&Bench::orientation, &Orientation::flipped_y>},
+    {"turned", "90|180|270", "90", "the camera is turned, degrees",
+        {{90.0, 270.0, kWhole}},
+        [] (Bench &b, const Values &v) {
+          b.orientation.turned = int (v[0]) / 90 * 90;
+        }},
+    /* Optics. */
+    {"blur", "PIXELS", "3", "standard deviation of the blur", {{0.0, 16.0}},
+        put<&Bench::blur>},
+    {"focus-tilt", "PIXELS:DEGREES", "3:30",
+        "blur that grows across the frame, towards that direction",
+        {{0.0, 16.0}, kAny}, put<&Bench::focus_tilt, &Bench::focus_direction>},
+    {"perspective", "X/Y", "0.03/0.02", "tilt of the mirrors",
+        {{-0.3, 0.3}, {-0.3, 0.3}},
+        put_in<&Bench::alignment, &A::tilt_x, &A::tilt_y>},
+    {"distortion", "PART", "0.02", "radial shift of a corner", {{-0.1, 0.1}},
+        put_in<&Bench::alignment, &A::distortion>},
+    {"rotation", "DEGREES", "4", "of the camera", {{-45.0, 45.0}},
+        put_in<&Bench::alignment, &A::rotation>},
+    {"scale", "PIXELS", "1.1", "pixels for each mirror", {{0.5, 4.0}},
+        put_in<&Bench::alignment, &A::scale>},
+    {"shift", "X/Y", "100/0", "of the camera, mirrors", {kAny, kAny},
+        put_in<&Bench::alignment, &A::shift_x, &A::shift_y>},
+    {"dust", "N", "6", "spots that block light", {kCount}, put<&Bench::dust>},
+    /* Frames on their way. */
+    {"lose", "PART", "0.05", "frames that are lost", {kPart},
+        put<&Bench::lose>},
+    {"slip", "TIME", "7s", "the masks come a slot later that often", {kTime},
+        put<&Bench::slip_every>},
+    {"frame-jitter", "TIME", "30ms", "max delay of a frame on its way", {kTime},
+        put<&Bench::frame_jitter>},
+};
 
 std::optional<double>
 parse_number (std::string_view text, const Range &range)
@@ -354,9 +281,8 @@ parse_number (std::string_view text, const Range &range)
   } else {
     number = parse_real (text);
   }
-  const bool fits =
-      number && *number >= range.low && *number <= range.high &&
-      (range.kind != Range::Kind::whole || *number == std::floor (*number));
+  const bool fits = number && *number >= range.low && *number <= range.high &&
+                    (range.kind != kWhole || *number == std::floor (*number));
   return fits ? number : std::nullopt;
 }
 
@@ -364,20 +290,19 @@ parse_number (std::string_view text, const Range &range)
 std::optional<Values>
 parse_values (const Word &word, std::string_view text)
 {
-  Values values;
-  if (word.ranges.empty ())
+  Values values = {1.0, 1.0}; // of flags
+  const std::string_view wanted = word.value;
+  if (wanted.empty () || !word.set)
     return values;
-  const char separator =
-      std::string_view (word.value).find ('/') != std::string_view::npos ? '/'
-                                                                         : ':';
+  const char separator = wanted.find ('/') != wanted.npos ? '/' : ':';
   const auto pieces = split (text, separator);
-  if (pieces.size () != word.ranges.size ())
+  if (pieces.size () != split (wanted, separator).size ())
     return std::nullopt;
   for (std::size_t i = 0; i < pieces.size (); i++) {
     const auto number = parse_number (pieces[i], word.ranges[i]);
     if (!number)
       return std::nullopt;
-    values.push_back (*number);
+    values[i] = *number;
   }
   return values;
 }
@@ -395,8 +320,8 @@ apply (Bench &bench, std::string_view piece)
   }
   const auto equals = piece.find ('=');
   const std::string_view name = piece.substr (0, equals);
-  const auto found = std::ranges::find (all_words (), name, &Word::name);
-  if (found == all_words ().end ())
+  const auto found = std::ranges::find (kWords, name, &Word::name);
+  if (found == std::end (kWords))
     return Error{"fault " + in_quotes (piece) +
                  " has no known name; \"--faults help\" lists the names"};
   const bool given = equals != piece.npos;
@@ -410,7 +335,8 @@ apply (Bench &bench, std::string_view piece)
     return Error{"fault " + in_quotes (piece) + " is not " + found->name + "=" +
                  found->value + " within its limits; write for example " +
                  found->name + "=" + found->usual};
-  found->set (bench, *values);
+  if (found->set)
+    found->set (bench, *values);
   bench.parts[found->name] = std::string (text);
   return {};
 }
@@ -432,7 +358,7 @@ std::string
 fault_help ()
 {
   std::string text;
-  for (const Word &word : all_words ()) {
+  for (const Word &word : kWords) {
     std::string left = "  " + std::string (word.name);
     if (word.value[0] != '\0')
       left += "[=" + std::string (word.value) + "]";

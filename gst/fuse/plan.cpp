@@ -162,8 +162,7 @@ Fuse::noise (const Schedule &schedule) const
                       schedule.white_slots ();
   }
   if (noise.read_noise == Settings::kUnset)
-    noise.read_noise =
-        known && known->read_noise ? known->read_noise->value : 0.0;
+    noise.read_noise = known ? value_or (known->read_noise, 0.0) : 0.0;
   return noise;
 }
 

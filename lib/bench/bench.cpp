@@ -106,12 +106,12 @@ BenchOptions::completed (
   const auto complete = [] (double &number,
                             const std::optional<Measured> &measured) {
     if (number == kUnset)
-      number = measured ? measured->value : 0.0;
+      number = value_or (measured, 0.0);
   };
   if (profile) {
     if (bits == 0)
       made.bits = profile->bits;
-    made.black_level = profile->black_level ? profile->black_level->value : 0.0;
+    made.black_level = value_or (profile->black_level, 0.0);
     if (alignment == Alignment{})
       made.mapping = profile->mapping;
     const auto electrons = profile->electrons_per_number ();

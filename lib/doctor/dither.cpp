@@ -54,8 +54,7 @@ public:
         transfer_ (transfer), step_ (thinning_of ({good.width, good.height}))
   {
     const double period = double (examination.rig.parts ().rate.period ());
-    const auto &exposure = examination.profile.exposure;
-    part_ = period / kShorter / (exposure ? exposure->value : period);
+    part_ = period / kShorter / value_or (examination.profile.exposure, period);
   }
 
   Result<void> see_light (

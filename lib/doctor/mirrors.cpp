@@ -63,9 +63,7 @@ MirrorRun::see_light ()
   const int largest = examination_.rig.parts ().largest ();
   const Examination::Lit &inside = examination_.inside;
   const double period = double (examination_.rig.parts ().rate.period ());
-  const double exposure = examination_.profile.exposure
-                              ? examination_.profile.exposure->value
-                              : period;
+  const double exposure = value_or (examination_.profile.exposure, period);
   ASSIGN_OR_RETURN (
       on_, look_at_light (examination_, lit (0, 1), 1, kFrames, &off_.mean));
   defects_ = find_defects (off_.mean, on_.mean, largest);
@@ -90,9 +88,8 @@ MirrorRun::measure_leak ()
   const double light = std::max (1e-3, on.mean - off.mean);
   const double slot = light / exposed_ / fine.of;
   /* Without a gain, a small part of the range must do as a pedestal. */
-  const double gain = examination_.profile.conversion_gain
-                          ? examination_.profile.conversion_gain->value
-                          : 0.3 * examination_.rig.parts ().largest ();
+  const double gain = value_or (examination_.profile.conversion_gain,
+      0.3 * examination_.rig.parts ().largest ());
   const int pedestal =
       pedestal_for (fine, slot, gain, off.variance > 0.3 ? 1.0 : 0.0);
   ASSIGN_OR_RETURN (const OffLight found,
@@ -273,8 +270,7 @@ MirrorRun::run ()
     const int largest = examination_.rig.parts ().largest ();
     finding_.exhibits.push_back (
         {"All mirrors on", picture_of (on_.mean, 0.0, largest)});
-    const auto &black = examination_.profile.black_level;
-    const double dark = black ? black->value : 0.0;
+    const double dark = value_or (examination_.profile.black_level, 0.0);
     finding_.exhibits.push_back (
         {"All mirrors off, 20 times as bright; black: no light",
             picture_of (off_.mean, dark, dark + 0.05 * largest)});

@@ -98,16 +98,13 @@ measure_off_light (Examination &examination, int frames,
       pedestal > 0 ? lit (fine.first, pedestal) : no_light ();
   const Image<float> *weights = pedestal > 0 ? &dark : nullptr;
   const Nanoseconds period = examination.rig.parts ().rate.period ();
-  const double delay = examination.profile.trigger_delay
-                           ? examination.profile.trigger_delay->value
-                           : 0.0;
+  const double delay = value_or (examination.profile.trigger_delay, 0.0);
   const double lit_until = double (period) * (fine.first + pedestal) / fine.of;
   const double enough = pedestal > 0 ? lit_until - delay + kAfterPedestal : 0.0;
   const auto shorter =
       std::max (period / kShorter, Nanoseconds (std::llround (enough)));
-  const double longest = examination.profile.exposure
-                             ? examination.profile.exposure->value
-                             : double (period);
+  const double longest =
+      value_or (examination.profile.exposure, double (period));
   /* Of flicker that is in step with the frames, each look sees another phase.
    */
   const double unsteady = pedestal_light * steady_flicker (examination, frames);

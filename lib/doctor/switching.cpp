@@ -250,9 +250,7 @@ measure_switching (Examination &examination, const Image<float> &dark,
   const auto slot_at = [&] (double time) {
     return int (std::lround (time * slots / double (period)));
   };
-  const double delay = examination.profile.trigger_delay
-                           ? examination.profile.trigger_delay->value
-                           : 0.0;
+  const double delay = value_or (examination.profile.trigger_delay, 0.0);
   const double end = delay + 0.5 * double (period);
   const int least = slot_at (double (kLeast)) + 1;
   int first = slot_at (end - std::max (kBefore, kBeforePart * double (period)));

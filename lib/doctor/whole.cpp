@@ -73,9 +73,9 @@ count_slips (Examination &examination, double seconds)
       with_exposure (examination, parts.rate.period () / 2, watch));
   if (levels.empty ())
     return std::uint64_t (0);
-  const auto &black = examination.profile.black_level;
   const double first = levels.front ();
-  const double other = kOtherSlot * (first - (black ? black->value : 0.0));
+  const double other =
+      kOtherSlot * (first - value_or (examination.profile.black_level, 0.0));
   return std::uint64_t (std::ranges::count_if (
       levels, [&] (double level) { return std::abs (level - first) > other; }));
 }

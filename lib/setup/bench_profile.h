@@ -25,6 +25,13 @@ struct Measured {
   bool operator== (const Measured &) const = default;
 };
 
+/** @p otherwise for what was not measured. */
+inline double
+value_or (const std::optional<Measured> &number, double otherwise)
+{
+  return number ? number->value : otherwise;
+}
+
 /**
  * The numbers of a bench. What was not measured is absent.
  *

@@ -151,13 +151,10 @@ StreamSetup::as_partner (Extent frames) const
   PartnerSetup made{frames, known_mapping ()};
   if (!bench)
     return made;
-  const auto value_of = [] (const std::optional<Measured> &measured) {
-    return measured ? measured->value : 0.0;
-  };
   made.black = bench->black ();
   made.electrons = bench->electrons_per_number ().value_or (0.0);
-  made.read_noise = value_of (bench->read_noise);
-  made.light_ratio = value_of (bench->light_ratio);
+  made.read_noise = value_or (bench->read_noise, 0.0);
+  made.light_ratio = value_or (bench->light_ratio, 0.0);
   return made;
 }
 

@@ -117,15 +117,8 @@ public:
   Result<void> show (const StillMask &mask, int slots) override;
   void park () override;
   Result<void> expose (std::optional<Nanoseconds> time) override;
-  Result<std::vector<SeenFrame>> watch (int frames) override
-  {
-    return watch_until (std::numeric_limits<Nanoseconds>::max (), frames);
-  }
-  Result<std::vector<SeenFrame>> watch_for (
-      Nanoseconds time, int frames) override
-  {
-    return watch_until (monotonic_now () + time, frames);
-  }
+  Result<std::vector<SeenFrame>> watch_until (
+      Nanoseconds until, int frames) override;
   Result<std::vector<SeenFrame>> deliver (int frames) override;
   Result<void> record (const Schedule &schedule, double seconds,
       const std::function<void (const RecordedFrame &)> &take) override;
@@ -141,7 +134,6 @@ private:
   void read_dmd ();
   void forget_frames ();
   Result<std::unique_ptr<FramePipeline>> recording_pipeline () const;
-  Result<std::vector<SeenFrame>> watch_until (Nanoseconds until, int frames);
   bool is_outdated (const SeenFrame &frame);
   Nanoseconds exposure_of (std::optional<Nanoseconds> time) const;
   Nanoseconds patience () const

@@ -363,25 +363,12 @@ SimulatedRig::frame_of (const Shot &shot)
 }
 
 Result<std::vector<SeenFrame>>
-SimulatedRig::watch (int frames)
+SimulatedRig::watch_until (Nanoseconds until, int frames)
 {
-  std::vector<SeenFrame> seen;
-  while (int (seen.size ()) < frames) {
-    const auto shot = arrive (now_ + patience ());
-    if (!shot)
-      break;
-    seen.push_back (frame_of (*shot));
-  }
-  return seen;
-}
-
-Result<std::vector<SeenFrame>>
-SimulatedRig::watch_for (Nanoseconds time, int frames)
-{
-  const Nanoseconds until = now_ + time;
+  const bool ends = until < std::numeric_limits<Nanoseconds>::max ();
   std::vector<SeenFrame> seen;
   while (int (seen.size ()) < frames && now_ < until) {
-    const auto shot = arrive (until);
+    const auto shot = arrive (ends ? until : now_ + patience ());
     if (!shot)
       break;
     seen.push_back (frame_of (*shot));

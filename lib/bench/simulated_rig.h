@@ -36,9 +36,8 @@ public:
   Result<void> show (const StillMask &mask, int slots) override;
   void park () override;
   Result<void> expose (std::optional<Nanoseconds> time) override;
-  Result<std::vector<SeenFrame>> watch (int frames) override;
-  Result<std::vector<SeenFrame>> watch_for (
-      Nanoseconds time, int frames) override;
+  Result<std::vector<SeenFrame>> watch_until (
+      Nanoseconds until, int frames) override;
   Result<std::vector<SeenFrame>> deliver (int frames) override;
   Result<void> record (const Schedule &schedule, double seconds,
       const std::function<void (const RecordedFrame &)> &take) override;

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -88,13 +89,16 @@ public:
   virtual Result<void> expose (std::optional<Nanoseconds> time) = 0;
   /**
    * The frames that come from now on, which are those after the last watch ()
-   * if nothing was called in between. Fewer than @p frames if none came for two
-   * seconds, or for ten frame periods, whichever is longer.
+   * if nothing was called in between. Fewer than @p frames at the time @p until
+   * of now (), or if none came for two seconds, or for ten frame periods,
+   * whichever is longer.
    */
-  virtual Result<std::vector<SeenFrame>> watch (int frames) = 0;
-  /** The same, for @p time at most. */
-  virtual Result<std::vector<SeenFrame>> watch_for (
-      Nanoseconds time, int frames) = 0;
+  virtual Result<std::vector<SeenFrame>> watch_until (
+      Nanoseconds until, int frames) = 0;
+  Result<std::vector<SeenFrame>> watch (int frames)
+  {
+    return watch_until (std::numeric_limits<Nanoseconds>::max (), frames);
+  }
   /** Shows all mirrors on and takes @p frames as the network delivers them:
    * also those that lack pixels, which watch () may leave out. They need not
    * have a picture. */

@@ -209,7 +209,8 @@ TriggerCheck::check_parked (double ratio, double step, double uneven)
   const int in_flight = kFramesInFlight + int (kTimeInFlight / step);
   const double enough = 2.0 * step * in_flight; // s
   ASSIGN_OR_RETURN (const auto parked,
-      rig_.watch_for (Nanoseconds (1e9 * enough), in_flight + 2));
+      rig_.watch_until (
+          rig_.now () + Nanoseconds (1e9 * enough), in_flight + 2));
   const std::string rate = real_text (
       std::round (ratio * parts_.rate.num / parts_.rate.den * 1e3) / 1e3);
   if (int (parked.size ()) > in_flight)

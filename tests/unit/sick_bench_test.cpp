@@ -179,7 +179,7 @@ TEST (SickBench, TheTriggerDecidesWhichFramesCome)
   const auto before = parked->now ();
   EXPECT_TRUE (parked->watch (10)->empty ());
   EXPECT_EQ (parked->now () - before, 2000 * kMs);
-  EXPECT_TRUE (parked->watch_for (600 * kMs, 10)->empty ());
+  EXPECT_TRUE (parked->watch_until (parked->now () + 600 * kMs, 10)->empty ());
   EXPECT_EQ (parked->now () - before, 2600 * kMs);
 }
 

@@ -75,8 +75,8 @@ above (const Measured &number, double limit)
   return number.value - 2.0 * number.sigma > limit;
 }
 
-/** The check, step by step. A step returns false if those after it make no
- * sense. */
+/** The check, step by step. A bool is false if what comes next makes no sense.
+ */
 class TriggerCheck
 {
 public:
@@ -97,8 +97,6 @@ private:
   Result<bool> check_frames ();
   bool check_steady (const std::vector<double> &levels);
   Result<bool> check_parked (double ratio, double step, double uneven);
-  Result<bool> check_light ();
-  Result<bool> check_lag ();
   bool judge_rows ();
   Result<void> sample (int first, int count, int exposure, int frames)
   {
@@ -226,21 +224,6 @@ TriggerCheck::check_parked (double ratio, double step, double uneven)
     finding_.blame ("free-running",
         "the frame rate is " + rate + " frames/s, not that of the trigger");
   return finding_.diagnoses.empty ();
-}
-
-/** Whether pixel values can tell how much light there was. */
-Result<bool>
-TriggerCheck::check_light ()
-{
-  RETURN_IF_ERROR (check_response (examination_, finding_));
-  return finding_.diagnoses.empty ();
-}
-
-/** In which frame a new mask shows first. */
-Result<bool>
-TriggerCheck::check_lag ()
-{
-  return codedexposure::check_lag (examination_, last_, finding_);
 }
 
 Result<void>
@@ -500,12 +483,15 @@ TriggerCheck::diagnose_exposure (const LightFit &fit)
 Result<Finding>
 TriggerCheck::run ()
 {
-  for (const auto step : {&TriggerCheck::check_frames,
-           &TriggerCheck::check_light, &TriggerCheck::check_lag}) {
-    ASSIGN_OR_RETURN (const bool go_on, (this->*step) ());
-    if (!go_on)
-      return std::move (finding_);
-  }
+  ASSIGN_OR_RETURN (const bool triggered, check_frames ());
+  if (!triggered)
+    return std::move (finding_);
+  RETURN_IF_ERROR (check_response (examination_, finding_));
+  if (!finding_.diagnoses.empty ())
+    return std::move (finding_);
+  ASSIGN_OR_RETURN (const bool seen, check_lag (examination_, last_, finding_));
+  if (!seen)
+    return std::move (finding_);
   RETURN_IF_ERROR (measure_exposure ());
   finding_.sort ();
   return std::move (finding_);

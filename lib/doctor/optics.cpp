@@ -229,10 +229,8 @@ OpticsRun::report_share ()
   std::vector<Position> row (std::size_t (mirrors_.width));
   for (int y = 0; y < mirrors_.height; y++) {
     mapping.camera_row (y, row);
-    mirrors += double (std::ranges::count_if (row, [&] (const Position &at) {
-      return at.x > -0.5 && at.y > -0.5 && at.x < camera_.width - 0.5 &&
-             at.y < camera_.height - 0.5;
-    }));
+    mirrors += double (std::ranges::count_if (
+        row, [&] (Position at) { return mapping.in_frame (at); }));
   }
   const Measured share{100 * seen / camera_.width / camera_.height, 0.0};
   finding_.add ("pixels that see a mirror", share);

@@ -405,21 +405,16 @@ SecondRun::compare_views (const Mapping &of_second)
     return finding_.add ("second-shift", kNotMeasured);
   constexpr int kStep = 4;
   double first = 0.0, both = 0.0;
-  const Extent camera = of_first->camera (), other = of_second.camera ();
   std::vector<Position> row (std::size_t (of_second.mirrors ().width));
   std::vector<Position> row_of_first = row;
-  const auto within = [] (const Position &at, Extent size) {
-    return at.x > -0.5 && at.y > -0.5 && at.x < size.width - 0.5 &&
-           at.y < size.height - 0.5;
-  };
   for (int y = 0; y < of_second.mirrors ().height; y += kStep) {
     of_first->camera_row (y, row_of_first);
     of_second.camera_row (y, row);
     for (std::size_t x = 0; x < row.size (); x += kStep) {
-      if (!within (row_of_first[x], camera))
+      if (!of_first->in_frame (row_of_first[x]))
         continue;
       first++;
-      both += within (row[x], other);
+      both += of_second.in_frame (row[x]);
     }
   }
   finding_.measure ("second-shift", {100 * both / std::max (1.0, first), 0.0});

@@ -332,6 +332,13 @@ Mapping::covers (Position mirror) const
          mirror.y >= -0.5 && mirror.y < parts_.mirrors.height - 0.5;
 }
 
+bool
+Mapping::in_frame (Position place) const
+{
+  return place.x > -0.5 && place.x < parts_.camera.width - 0.5 &&
+         place.y > -0.5 && place.y < parts_.camera.height - 0.5;
+}
+
 Homography
 Mapping::centred () const
 {

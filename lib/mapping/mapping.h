@@ -126,6 +126,8 @@ public:
   std::array<double, 4> slope_at (double x, double y) const;
   /** Whether that place is a mirror of the array, to half a mirror. */
   bool covers (Position mirror) const;
+  /** Whether that camera place is in the frame, to half a pixel. */
+  bool in_frame (Position place) const;
 
   /** The homography on ((x - cx) / r, (y - cy) / r, 1), with (cx, cy) the
    * centre of the frame, r half its longer side, less one, and the last number

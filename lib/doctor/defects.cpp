@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "base/statistics.h"
-#include "doctor/field.h"
+#include "doctor/statistics.h"
 
 namespace codedexposure
 {

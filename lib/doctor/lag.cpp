@@ -8,7 +8,7 @@
 #include <string>
 
 #include "base/try.h"
-#include "doctor/level.h"
+#include "doctor/statistics.h"
 
 namespace codedexposure
 {

@@ -9,10 +9,10 @@
 #include "base/statistics.h"
 #include "base/try.h"
 #include "doctor/checks.h"
-#include "doctor/field.h"
 #include "doctor/picture.h"
 #include "doctor/pulses.h"
 #include "doctor/stack.h"
+#include "doctor/statistics.h"
 
 namespace codedexposure
 {

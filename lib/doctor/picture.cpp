@@ -7,7 +7,7 @@
 
 #include "base/statistics.h"
 #include "doctor/defects.h"
-#include "doctor/field.h"
+#include "doctor/statistics.h"
 
 namespace codedexposure
 {

@@ -10,7 +10,6 @@
 
 #include "base/statistics.h"
 #include "base/try.h"
-#include "doctor/level.h"
 
 namespace codedexposure
 {
@@ -357,20 +356,6 @@ Result<void>
 check_response (Examination &examination, Finding &finding)
 {
   return ResponseRun (examination, finding).run ();
-}
-
-BorderLight
-border_light (ImageView<const std::uint16_t> picture)
-{
-  const int rows = std::max (1, picture.height / 4);
-  BorderLight light;
-  for (int y = 0; y < rows; y++)
-    for (int x = 0; x < picture.width; x++) {
-      light.first += picture.at (x, y);
-      light.last += picture.at (x, picture.height - 1 - y);
-    }
-  const double pixels = double (rows) * picture.width;
-  return {light.first / pixels, light.last / pixels};
 }
 
 std::optional<Measured>

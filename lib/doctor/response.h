@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "doctor/checks.h"
+#include "doctor/statistics.h"
 
 namespace codedexposure
 {
@@ -34,11 +35,6 @@ Bend bend_of (const std::vector<ResponsePoint> &points);
  */
 Result<void> check_response (Examination &examination, Finding &finding);
 
-/** Means of the first and of the last quarter of the rows of a frame, DN. */
-struct BorderLight {
-  double first = 0.0, last = 0.0;
-};
-BorderLight border_light (ImageView<const std::uint16_t> picture);
 /**
  * By how much later the last row is exposed than the first one, s. None if @p
  * tiles do not tell.

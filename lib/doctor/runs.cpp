@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "base/try.h"
-#include "doctor/level.h"
+#include "doctor/statistics.h"
 
 namespace codedexposure
 {

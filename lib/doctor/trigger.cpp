@@ -11,11 +11,11 @@
 #include "base/try.h"
 #include "doctor/checks.h"
 #include "doctor/lag.h"
-#include "doctor/level.h"
 #include "doctor/light_fit.h"
 #include "doctor/pulses.h"
 #include "doctor/response.h"
 #include "doctor/runs.h"
+#include "doctor/statistics.h"
 
 namespace codedexposure
 {

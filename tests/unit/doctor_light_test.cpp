@@ -10,9 +10,8 @@
 
 #include "bench/simulated_rig.h"
 #include "doctor/checks.h"
-#include "doctor/field.h"
-#include "doctor/level.h"
 #include "doctor/light_fit.h"
+#include "doctor/statistics.h"
 
 using namespace codedexposure;
 

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* One picture of even light in a few numbers. */
+/* A picture in a few numbers: its level, and how light falls off over it. */
 #pragma once
 
 #include <cstdint>
 
 #include "base/image.h"
+#include "setup/bench_profile.h"
 
 namespace codedexposure
 {
@@ -31,5 +32,25 @@ Level level_of (ImageView<const std::uint16_t> picture, int largest);
  * than 1 if the lowest bits are missing.
  */
 double rounding_doubt (double noise, int step);
+
+/** Means of the first and of the last quarter of the rows of a frame, DN. */
+struct BorderLight {
+  double first = 0.0, last = 0.0;
+};
+BorderLight border_light (ImageView<const std::uint16_t> picture);
+
+/**
+ * Light that the darkest corner loses against the centre of @p picture, as a
+ * part; negative if it is the brighter one. It is that of a smooth surface:
+ * dust, odd pixels and a part that sees no mirror do not count. NaN if too few
+ * pixels see mirrors.
+ *
+ * @p picture  of all mirrors on, less that of all mirrors off
+ */
+Measured corner_loss (ImageView<const float> picture);
+
+/** @p image without what is smaller than some ten pixels, such as defects: the
+ * medians of blocks, bilinear between their centres and beyond them. */
+Image<float> smooth (const Image<float> &image);
 
 } // namespace codedexposure

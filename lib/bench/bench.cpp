@@ -137,8 +137,8 @@ Result<OpticalBench>
 OpticalBench::make (int width, int height, const BenchOptions &options)
 {
   if (width < 1 || height < 1)
-    return Error{"a bench of " + std::to_string (width) + "x" +
-                 std::to_string (height) + " mirrors has no picture"};
+    return Error{"a bench of " + size_text ({width, height}) +
+                 " mirrors has no picture"};
   RETURN_IF_ERROR (check (options));
   if (const auto &mapping = options.mapping;
       mapping && (mapping->mirrors ().width < width ||
@@ -149,8 +149,8 @@ OpticalBench::make (int width, int height, const BenchOptions &options)
   try {
     return OpticalBench (width, height, options);
   } catch (const std::bad_alloc &) {
-    return Error{"there is no memory for a bench of " + std::to_string (width) +
-                     "x" + std::to_string (height) + " mirrors",
+    return Error{"there is no memory for a bench of " +
+                     size_text ({width, height}) + " mirrors",
         ErrorCode::out_of_memory};
   }
 }

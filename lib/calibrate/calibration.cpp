@@ -150,8 +150,7 @@ try {
   RETURN_IF_ERROR (Mapping::make ({camera, mirrors}));
   if (std::min (camera.width, camera.height) < 32)
     return Error{"a calibration needs frames of 32x32 pixels or more, not " +
-                 std::to_string (camera.width) + "x" +
-                 std::to_string (camera.height)};
+                 size_text (camera)};
   Calibration made (camera, mirrors, row_step);
   for (const Pattern &pattern : patterns) {
     if (made.find (pattern) != nullptr)
@@ -185,8 +184,7 @@ Calibration::Calibration (Extent camera, Extent mirrors, int row_step)
 Calibration::Slot *
 Calibration::find (const Pattern &pattern)
 {
-  const auto at = std::find_if (slots_.begin (), slots_.end (),
-      [&] (const Slot &s) { return s.pattern == pattern; });
+  const auto at = std::ranges::find (slots_, pattern, &Slot::pattern);
   return at == slots_.end () ? nullptr : &*at;
 }
 
@@ -200,10 +198,9 @@ Calibration::add_frame (
     return Error{
         "pattern " + pattern.text () + " is not part of this calibration"};
   if (frame.width != camera_.width || frame.height != camera_.height)
-    return Error{"a calibration frame has " + std::to_string (frame.width) +
-                 "x" + std::to_string (frame.height) + " pixels; " +
-                 std::to_string (camera_.width) + "x" +
-                 std::to_string (camera_.height) + " are expected"};
+    return Error{"a calibration frame has " +
+                 size_text ({frame.width, frame.height}) + " pixels; " +
+                 size_text (camera_) + " are expected"};
   if (solved_ ||
       (slot->frames > 0 && slot->sum.width () == 0 && slot->mean.width () == 0))
     return Error{"a frame of pattern " + pattern.text () +
@@ -347,9 +344,8 @@ Calibration::gratings (Axis axis) const
     if (slot.pattern.kind == Pattern::Kind::grating &&
         slot.pattern.axis == axis)
       found.push_back (&slot);
-  std::sort (found.begin (), found.end (), [] (const Slot *a, const Slot *b) {
-    return a->pattern.phase < b->pattern.phase;
-  });
+  std::ranges::sort (
+      found, {}, [] (const Slot *slot) { return slot->pattern.phase; });
   return found;
 }
 
@@ -363,14 +359,13 @@ Calibration::usable_pixels (CalibrationResult &result) const
   const float covered =
       std::max (1.0f, kCovered * quantile (std::move (contrasts), 0.9));
   Image<std::uint8_t> usable (camera_.width, camera_.height);
-  for (int y = 0; y < camera_.height; y++)
-    for (int x = 0; x < camera_.width; x++) {
-      PixelQuality &quality = result.quality.at (x, y);
-      quality = result.contrast.at (x, y) < covered ? PixelQuality::uncovered
-                : saturated_.at (x, y) != 0         ? PixelQuality::saturated
-                                                    : PixelQuality::good;
-      usable.at (x, y) = quality == PixelQuality::good;
-    }
+  each_pixel (usable, [&] (int x, int y) {
+    PixelQuality &quality = result.quality.at (x, y);
+    quality = result.contrast.at (x, y) < covered ? PixelQuality::uncovered
+              : saturated_.at (x, y) != 0         ? PixelQuality::saturated
+                                                  : PixelQuality::good;
+    usable.at (x, y) = quality == PixelQuality::good;
+  });
   if (result.pixels (PixelQuality::saturated) >
       std::uint64_t (camera_.width) * std::uint64_t (camera_.height) / 2)
     return Error{"more than half of the pixels have the largest value; "
@@ -378,20 +373,12 @@ Calibration::usable_pixels (CalibrationResult &result) const
   return usable;
 }
 
-Result<Mapping>
-Calibration::coarse_mapping (ImageView<const std::uint8_t> usable) const
-{
-  ASSIGN_OR_RETURN (
-      const Homography coarse, fit_gray_codes (gray_x_, gray_y_, usable));
-  return Mapping::from_centred (camera_, mirrors_, coarse);
-}
-
 /* A stripe is wider than what is sought: it shows in the pixels that are beyond
  * the border of the stripe which they see by the mapping. */
 double
 Calibration::gray_difference (Axis axis, const CalibrationResult &result) const
 {
-  const GrayCode &code = gray_code (axis);
+  const GrayCode &code = axis == Axis::x ? gray_x_ : gray_y_;
   double sum = 0.0, pixels = 0.0;
   each_pixel (result.quality, [&] (int x, int y) {
     if (result.quality.at (x, y) != PixelQuality::good)
@@ -417,7 +404,10 @@ Calibration::fit () const
       Image<PixelQuality> (camera_.width, camera_.height),
       difference (white, dark), {}, {}};
   ASSIGN_OR_RETURN (const Image<std::uint8_t> usable, usable_pixels (result));
-  ASSIGN_OR_RETURN (const Mapping start, coarse_mapping (usable.view ()));
+  ASSIGN_OR_RETURN (const Homography coarse,
+      fit_gray_codes (gray_x_, gray_y_, usable.view ()));
+  ASSIGN_OR_RETURN (
+      const Mapping start, Mapping::from_centred (camera_, mirrors_, coarse));
 
   PhaseFit fit = {camera_, mirrors_, {}, {}, usable.view (),
       dark_smooth.view (), white_smooth.view (), start};
@@ -467,9 +457,8 @@ std::uint64_t
 CalibrationResult::pixels (PixelQuality what) const
 {
   std::uint64_t count = 0;
-  for (int y = 0; y < quality.height (); y++)
-    count += std::uint64_t (std::count (quality.view ().row (y),
-        quality.view ().row (y) + quality.width (), what));
+  each_pixel (
+      quality, [&] (int x, int y) { count += quality.at (x, y) == what; });
   return count;
 }
 

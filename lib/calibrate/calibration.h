@@ -108,13 +108,8 @@ private:
   Result<void> add_frame (
       const Pattern &pattern, ImageView<const Pixel> frame, int largest);
   Result<Image<std::uint8_t>> usable_pixels (CalibrationResult &result) const;
-  Result<Mapping> coarse_mapping (ImageView<const std::uint8_t> usable) const;
   double gray_difference (Axis axis, const CalibrationResult &result) const;
   Result<CalibrationResult> fit () const;
-  const GrayCode &gray_code (Axis axis) const
-  {
-    return axis == Axis::x ? gray_x_ : gray_y_;
-  }
 
   Extent camera_, mirrors_;
   int row_step_;

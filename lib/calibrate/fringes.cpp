@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/statistics.h"
+
 namespace codedexposure
 {
 
@@ -11,9 +13,8 @@ float
 Fringes::full_amplitude () const
 {
   float most = 0.0f;
-  for (int y = 0; y < amplitude.height (); y++)
-    for (int x = 0; x < amplitude.width (); x++)
-      most = std::max (most, amplitude.at (x, y));
+  each_pixel (amplitude,
+      [&] (int x, int y) { most = std::max (most, amplitude.at (x, y)); });
   return most / 2;
 }
 

@@ -514,9 +514,9 @@ try {
                  std::to_string (kMaxSampling) + ", use another period"};
   const Extent camera = expected.camera ();
   if (std::min (camera.width, camera.height) < kMinPeriods * samples)
-    return Error{"a frame of " + std::to_string (camera.width) + "x" +
-                 std::to_string (camera.height) + " pixels holds less than " +
-                 std::to_string (kMinPeriods) + " periods of the live grating"};
+    return Error{"a frame of " + size_text (camera) +
+                 " pixels holds less than " + std::to_string (kMinPeriods) +
+                 " periods of the live grating"};
   return LiveMoire (std::make_unique<State> (expected, options, samples));
 } catch (const std::bad_alloc &) {
   return out_of_memory ();

@@ -138,22 +138,33 @@ CalibrationSession::find_phase (ImageView<const Pixel> frame)
 INSTANTIATE (std::uint8_t)
 INSTANTIATE (std::uint16_t)
 
+namespace
+{
+
+std::vector<std::string>
+pose_lines (
+    const Mapping &mapping, const StageCorrection &correction, int decimals)
+{
+  const Pose sigma = mapping.pose_sigma ();
+  return {format ("rotation %+.*f ± %.0e°    magnification %.*f ± %.0e",
+              decimals, correction.rotation, sigma.rotation, decimals + 1,
+              correction.magnification, sigma.magnification),
+      format ("offset x %+.*f  y %+.*f ± %.0e mirrors    worst corner %.3f",
+          decimals, correction.offset.x, decimals, correction.offset.y,
+          sigma.shift_x, correction.deviation)};
+}
+
+} // namespace
+
 std::vector<std::string>
 alignment_lines (const CalibrationSession::Alignment &alignment)
 {
   const LiveReading &reading = alignment.reading;
-  const StageCorrection &todo = alignment.correction;
-  const Pose sigma = reading.mapping.pose_sigma ();
-  return {
-      format ("rotation %+.4f ± %.0e°    magnification %.5f ± %.0e",
-          todo.rotation, sigma.rotation, todo.magnification,
-          sigma.magnification),
-      format ("offset x %+.4f  y %+.4f ± %.0e mirrors    worst corner %.3f",
-          todo.offset.x, todo.offset.y, sigma.shift_x, todo.deviation),
-      format ("contrast x %.2f  y %.2f    covered %.0f %%%s",
-          reading.contrast.x, reading.contrast.y, 100 * reading.coverage,
-          reading.saturated > 0 ? "    SATURATED: less light" : ""),
-  };
+  auto lines = pose_lines (reading.mapping, alignment.correction, 4);
+  lines.push_back (format ("contrast x %.2f  y %.2f    covered %.0f %%%s",
+      reading.contrast.x, reading.contrast.y, 100 * reading.coverage,
+      reading.saturated > 0 ? "    SATURATED: less light" : ""));
+  return lines;
 }
 
 std::string
@@ -167,13 +178,7 @@ std::vector<std::string>
 mapping_lines (
     const CalibrationResult &result, const StageCorrection &correction)
 {
-  const Pose sigma = result.mapping.pose_sigma ();
-  return {format ("rotation %+.5f ± %.0e°    magnification %.6f ± %.0e",
-              correction.rotation, sigma.rotation, correction.magnification,
-              sigma.magnification),
-      format ("offset x %+.5f  y %+.5f ± %.0e mirrors    worst corner %.3f",
-          correction.offset.x, correction.offset.y, sigma.shift_x,
-          correction.deviation)};
+  return pose_lines (result.mapping, correction, 5);
 }
 
 std::vector<std::string>

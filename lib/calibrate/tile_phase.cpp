@@ -118,9 +118,8 @@ find (ImageView<const Pixel> frame, const Schedule &schedule)
       schedule.tile ().period_x (), schedule.tile ().period_y ()};
   if (frame.width < kZones * period.width ||
       frame.height < kZones * period.height)
-    return Error{"a frame of " + std::to_string (frame.width) + "x" +
-                 std::to_string (frame.height) + " pixels holds less than " +
-                 std::to_string (kZones) + "x" + std::to_string (kZones) +
+    return Error{"a frame of " + size_text ({frame.width, frame.height}) +
+                 " pixels holds less than " + size_text ({kZones, kZones}) +
                  " periods of the tile; use a smaller tile or larger frames"};
   const Levels flat = pattern_at (schedule, {});
   if (dot (flat, flat) < 1e-9)

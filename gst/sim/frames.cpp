@@ -160,8 +160,8 @@ bool
 check_mirrors (GstCodedExposureSim *self, const SimulatedMirrors &mirrors)
 {
   const GstVideoInfo &info = state (self).stream.plan->in;
-  const std::optional<Extent> size = mirrors.size ();
-  if (!size || mirrors.diamond () ||
+  const auto [size, diamond] = mirrors.shape ();
+  if (!size || diamond ||
       (size->width >= info.width && size->height >= info.height))
     return true;
   const std::string scene = size_text ({info.width, info.height});
@@ -202,7 +202,7 @@ prepare_bench (GstCodedExposureSim *self)
   BenchOptions optics =
       given.completed (stream.profile ? &*stream.profile : nullptr, stream.lit);
   if (stream.mirrors)
-    optics.diamond = stream.mirrors->diamond ();
+    optics.diamond = stream.mirrors->shape ().diamond;
   if (stream.bench && optics == stream.optics)
     return true;
 

@@ -162,8 +162,7 @@ struct Slip {
 struct Options {
   std::string mirrors;
   DmdInfo info;
-  std::optional<Extent> size;
-  std::optional<MirrorLayout> diamond;
+  SimulatedMirrors::Shape shape;
   Nanoseconds mask_time = 0;
   std::vector<Slip> slips;
   Failure failure = Failure::none;
@@ -176,8 +175,7 @@ public:
       : options_ (std::move (options)),
         mirrors_ (SimulatedMirrors::find (options_.mirrors))
   {
-    mirrors_->lay (options_.diamond);
-    mirrors_->limit (options_.size);
+    mirrors_->set_shape (options_.shape);
     for (const Slip &slip : options_.slips)
       mirrors_->slip_at (slip.slot, slip.by);
   }
@@ -281,8 +279,9 @@ parse_options (std::string_view device)
   const auto parse_serial = [] (std::string_view text) {
     return std::optional (std::string (text));
   };
-  const DeviceKey keys[] = {value_key ("size", "WxH", o.size, parse_size),
-      value_key ("layout", "address|lattice|cell", o.diamond, parse_layout),
+  const DeviceKey keys[] = {value_key ("size", "WxH", o.shape.size, parse_size),
+      value_key (
+          "layout", "address|lattice|cell", o.shape.diamond, parse_layout),
       value_key ("masks", "N", info.resident_masks, parse_masks),
       value_key ("min-active", "TIME", info.minimum_active, parse_time),
       value_key ("min-switching", "TIME", info.minimum_switching, parse_time),
@@ -299,8 +298,8 @@ parse_options (std::string_view device)
     return Error{"DMD " + in_quotes (device) +
                  " has no name; write sim:NAME, such as sim:bench"};
   info.name = "sim:" + o.mirrors;
-  info.size = o.size.value_or (Extent{1024, 768});
-  if (o.diamond)
+  info.size = o.shape.size.value_or (Extent{1024, 768});
+  if (o.shape.diamond)
     info.array = Array::diamond;
   return o;
 }

@@ -43,28 +43,22 @@ public:
     return motion_ != Motion::parked;
   }
 
-  /** Layout of the tile on a diamond array; none: an orthogonal array. */
-  void lay (std::optional<MirrorLayout> diamond)
+  /** What the device says of its mirrors. */
+  struct Shape {
+    /** Mirrors that the bench must not go beyond; none: as many as it needs. */
+    std::optional<Extent> size = {};
+    /** Layout of the tile on a diamond array; none: an orthogonal array. */
+    std::optional<MirrorLayout> diamond = {};
+  };
+  void set_shape (const Shape &shape)
   {
     const std::lock_guard guard (lock_);
-    diamond_ = diamond;
+    shape_ = shape;
   }
-  std::optional<MirrorLayout> diamond () const
+  Shape shape () const
   {
     const std::lock_guard guard (lock_);
-    return diamond_;
-  }
-
-  /** Mirrors that the bench must not go beyond; none: as many as it needs. */
-  void limit (std::optional<Extent> size)
-  {
-    const std::lock_guard guard (lock_);
-    size_ = size;
-  }
-  std::optional<Extent> size () const
-  {
-    const std::lock_guard guard (lock_);
-    return size_;
+    return shape_;
   }
 
   /** The last programmed one; none before the first upload. */
@@ -135,8 +129,7 @@ private:
 
   mutable std::mutex lock_; // covers everything below; a leaf lock
   std::optional<Schedule> schedule_;
-  std::optional<MirrorLayout> diamond_;
-  std::optional<Extent> size_;
+  Shape shape_;
   std::shared_ptr<const StillMask> hold_, held_; // from now on; since it began
   Motion motion_ = Motion::parked;
   bool owes_dark_exposure_ = false;

@@ -162,8 +162,8 @@ TEST (SimulatedDiamond, CarriesItsLayoutToTheBench)
   const auto dmd = open_simulated_dmd ("sim:diamond,layout=cell");
   ASSERT_TRUE (dmd.ok ());
   EXPECT_EQ ((*dmd)->info ().array, Array::diamond);
-  EXPECT_EQ (mirrors->diamond (), MirrorLayout::cell);
+  EXPECT_EQ (mirrors->shape ().diamond, MirrorLayout::cell);
   const auto plain = open_simulated_dmd ("sim:diamond");
-  EXPECT_EQ (mirrors->diamond (), std::nullopt);
+  EXPECT_EQ (mirrors->shape ().diamond, std::nullopt);
   EXPECT_FALSE (open_simulated_dmd ("sim:diamond,layout=x").ok ());
 }

@@ -72,26 +72,13 @@ first_mirror (const BenchOptions &options, Extent size)
   return {(mirrors.width - size.width) / 2, (mirrors.height - size.height) / 2};
 }
 
-/* One row: every mirror passes @on or @off of its light. */
-template <bool kFirst, typename Pixel>
+/* One row, of whose light each place passes a @part. */
+template <bool kFirst, typename Pixel, typename Part>
 void
-collect (const Pixel *scene, const std::uint8_t *mirrors, int width, float on,
-    float off, float *light)
+collect (const Pixel *scene, int width, Part part, float *light)
 {
   for (int x = 0; x < width; x++) {
-    const float passed = float (scene[x]) * (mirrors[x] != 0 ? on : off);
-    light[x] = kFirst ? passed : light[x] + passed;
-  }
-}
-
-/* The same if mirrors that are on cover a @share of each pixel. */
-template <bool kFirst, typename Pixel>
-void
-collect_shares (const Pixel *scene, const float *share, int width, float on,
-    float off, float *light)
-{
-  for (int x = 0; x < width; x++) {
-    const float passed = float (scene[x]) * (off + (on - off) * share[x]);
+    const float passed = float (scene[x]) * part (x);
     light[x] = kFirst ? passed : light[x] + passed;
   }
 }
@@ -205,22 +192,23 @@ OpticalBench::expose (ImageView<Pixel> scene, int mask, double slots)
   const float on = float (slots);
   const float off =
       mask == kAllMirrors ? on : float (slots * masks_->schedule ().leak ());
-  const auto collect_row =
-      empty_ ? collect<true, Pixel> : collect<false, Pixel>;
-  const auto collect_shared =
-      empty_ ? collect_shares<true, Pixel> : collect_shares<false, Pixel>;
-  const MirrorRows<std::uint8_t> &rows = mirrors_of (mask);
-  for (int y = 0; y < scene.height; y++) {
+  const auto collect_row = [&] (int y, auto part) {
     float *const row = light_.view ().row (y);
+    if (empty_)
+      collect<true> (scene.row (y), scene.width, part, row);
+    else
+      collect<false> (scene.row (y), scene.width, part, row);
+  };
+  const MirrorRows<std::uint8_t> &rows = mirrors_of (mask);
+  for (int y = 0; y < scene.height; y++)
     if (diamond_) {
       diamond_->look (rows, y, shares_.data ());
-      collect_shared (
-          scene.row (y), shares_.data (), scene.width, on, off, row);
+      collect_row (y, [on, off, share = shares_.data ()] (
+                          int x) { return off + (on - off) * share[x]; });
     } else {
-      collect_row (scene.row (y), rows.row (y + first_.y) + first_.x,
-          scene.width, on, off, row);
+      collect_row (y, [on, off, mirrors = rows.row (y + first_.y) + first_.x] (
+                          int x) { return mirrors[x] != 0 ? on : off; });
     }
-  }
   white_ = std::numeric_limits<Pixel>::max ();
   empty_ = false;
 }

@@ -81,9 +81,8 @@ void
 filter_colours (ImageView<float> light)
 {
   constexpr float kColours[2][2] = {{0.55f, 1.0f}, {1.0f, 0.4f}};
-  for (int y = 0; y < light.height; y++)
-    for (int x = 0; x < light.width; x++)
-      light.at (x, y) *= kColours[y % 2][x % 2];
+  each_pixel (
+      light, [&] (int x, int y) { light.at (x, y) *= kColours[y % 2][x % 2]; });
 }
 
 Processing::Processing (const SickBenchOptions &options)
@@ -115,10 +114,10 @@ void
 Processing::subtract_dark (ImageView<std::uint16_t> picture) const
 {
   const int black = int (std::lround (options_.black_level));
-  for (int y = 0; y < picture.height; y++)
-    for (int x = 0; x < picture.width; x++)
-      picture.at (x, y) =
-          std::uint16_t (std::max (int (picture.at (x, y)) - black, 0));
+  each_pixel (picture, [&] (int x, int y) {
+    picture.at (x, y) =
+        std::uint16_t (std::max (int (picture.at (x, y)) - black, 0));
+  });
 }
 
 /* @part of the mean of 3x3 pixels, and the rest of the pixel itself. */
@@ -144,9 +143,9 @@ Processing::apply (ImageView<std::uint16_t> picture)
 {
   const SickBenchOptions &o = options_;
   if (o.has ("test-image"))
-    for (int y = 0; y < picture.height; y++)
-      for (int x = 0; x < picture.width; x++)
-        picture.at (x, y) = std::uint16_t (x * largest_ / picture.width);
+    each_pixel (picture, [&] (int x, int y) {
+      picture.at (x, y) = std::uint16_t (x * largest_ / picture.width);
+    });
   if (o.dark_subtraction)
     subtract_dark (picture);
   if (o.noise_reduction > 0.0)
@@ -159,12 +158,11 @@ Processing::apply (ImageView<std::uint16_t> picture)
   const auto kept = std::uint16_t (~0u << o.missing_bits);
   if (table_.empty () && o.missing_bits == 0 && shift == 0)
     return;
-  for (int y = 0; y < picture.height; y++)
-    for (int x = 0; x < picture.width; x++) {
-      std::uint16_t &pixel = picture.at (x, y);
-      pixel = std::uint16_t (
-          (kept & (table_.empty () ? pixel : table_[pixel])) >> shift);
-    }
+  each_pixel (picture, [&] (int x, int y) {
+    std::uint16_t &pixel = picture.at (x, y);
+    pixel = std::uint16_t (
+        (kept & (table_.empty () ? pixel : table_[pixel])) >> shift);
+  });
 }
 
 } // namespace codedexposure

@@ -83,15 +83,6 @@ basis_of (const MatrixXd &columns)
   return MatrixXd (factors.householderQ ()).leftCols (factors.rank ());
 }
 
-double
-Polynomial::at (double x) const
-{
-  double sum = 0.0;
-  for (Index i = factors.size (); i-- > 0;)
-    sum = sum * x + factors[i];
-  return sum;
-}
-
 Polynomial
 fit_polynomial (const std::vector<Sample> &samples, int degree)
 {

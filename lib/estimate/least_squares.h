@@ -28,8 +28,6 @@ Eigen::MatrixXd basis_of (const Eigen::MatrixXd &columns);
 struct Polynomial {
   Eigen::VectorXd factors;
   Eigen::MatrixXd covariance;
-
-  double at (double x) const;
 };
 
 /** A number that was measured at @p x. */

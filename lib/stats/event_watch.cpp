@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "event_watch.h"
+#include "stats/event_watch.h"
 
 #include <algorithm>
 #include <cmath>

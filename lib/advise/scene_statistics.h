@@ -2,7 +2,9 @@
 /* What is assumed about a scene for predictions. */
 #pragma once
 
-#include "base/result.h"
+#include <numbers>
+
+#include "base/range.h"
 #include "estimate/scene_model.h"
 
 namespace codedexposure
@@ -20,9 +22,22 @@ struct SceneStatistics {
   double speed = 100.0;   ///< pixels a second
 
   /** Error when a number is out of range. */
-  Result<void> check () const;
+  Result<void> check () const
+  {
+    return check_ranges ({
+        {"level", level, 0.001, 1.0},
+        {"contrast", contrast, 0.001, 1.0},
+        {"detail (pixels)", detail, 0.1, 1000.0},
+        {"speed (pixels/s)", speed, 0.0, 1e6},
+    });
+  }
   /** The texture for slots that begin @p pitch seconds apart. */
-  SceneClass patch (double pitch) const;
+  SceneClass patch (double pitch) const
+  {
+    return {.length = detail / std::numbers::sqrt3,
+        .correlation = 1.0,
+        .speed = speed * pitch};
+  }
 };
 
 } // namespace codedexposure

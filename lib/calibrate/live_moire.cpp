@@ -351,9 +351,7 @@ Plane
 LiveMoire::State::start (
     const Phasors &phasors, double sign, bool along_y) const
 {
-  const Extent camera = expected.camera ();
-  const double cx = 0.5 * (camera.width - 1), cy = 0.5 * (camera.height - 1);
-  const double r = std::max (cx, cy);
+  const auto [cx, cy, r] = CentredFrame (expected.camera ());
   double slope_x = phasors.slope (false), slope_y = phasors.slope (true);
   const double step = carrier.period;
 
@@ -383,9 +381,7 @@ double
 LiveMoire::State::refine (
     const Phasors &phasors, Plane &plane, double sign, double limit) const
 {
-  const Extent camera = expected.camera ();
-  const double cx = 0.5 * (camera.width - 1), cy = 0.5 * (camera.height - 1);
-  const double r = std::max (cx, cy);
+  const auto [cx, cy, r] = CentredFrame (expected.camera ());
   const double step = carrier.period / r;
   const double xi0 = (phasors.first_x - cx) / r;
   const Phasor rotation (std::polar (1.0, -sign * plane.at[0] * step));

@@ -453,7 +453,7 @@ SickBench::add_light (const Shot &shot, const LightWindow &window,
       if (kind == Shown::Kind::on)
         passed.on += light;
       else
-        passed.pictures[program.masks[stretch.mask]] += light;
+        passed.add (program.masks[stretch.mask], light);
     }
   }
 }

@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <deque>
 #include <limits>
-#include <map>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "base/image.h"
@@ -100,7 +100,19 @@ private:
   /** Seconds of light that mirrors passed. */
   struct Passed {
     double on = 0.0; // all of them
-    std::map<MirrorProgram::Mask, double> pictures = {};
+    /* In the order in which they are shown, so that sums are always the same.
+     */
+    std::vector<std::pair<MirrorProgram::Mask, double>> pictures = {};
+
+    void add (const MirrorProgram::Mask &mask, double light)
+    {
+      for (auto &[known, sum] : pictures)
+        if (known == mask) {
+          sum += light;
+          return;
+        }
+      pictures.emplace_back (mask, light);
+    }
   };
   struct HotPixel {
     Offset at;

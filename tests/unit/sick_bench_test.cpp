@@ -96,6 +96,37 @@ TEST (SickBench, ShowsTheLightOfItsLevel)
   EXPECT_NEAR (off, 10 + 0.7 * 245 * 0.01, 0.1);
 }
 
+TEST (SickBench, APictureDoesNotDependOnWhereItsMasksAreInMemory)
+{
+  SickBenchOptions options;
+  options.bits = 16;
+  options.full_well = 1e9; // so that the last bits of sums show
+  using Mask = std::shared_ptr<Image<std::uint8_t>>;
+  const auto picture_of = [&options] (const Mask &first, const Mask &second) {
+    for (int y = 0; y < options.mirrors.height; y++)
+      for (int x = 0; x < options.mirrors.width; x++) {
+        first->at (x, y) = x % 2 == 0;
+        second->at (x, y) = y % 3 == 0;
+      }
+    auto bench = SickBench::make (options);
+    EXPECT_TRUE (bench.ok ());
+    bench->show (
+        0, {.period = 40 * kMs,
+               .masks = {first, second},
+               .stretches = {{0, 15 * kMs, 0}, {15 * kMs, 39 * kMs, 1}},
+               .slot = 20 * kMs});
+    Image<std::uint16_t> picture (options.camera.width, options.camera.height);
+    const auto shot = bench->next (1000 * kMs);
+    EXPECT_TRUE (shot.has_value ());
+    bench->take (shot.value_or (Shot{}), picture.view ());
+    return picture;
+  };
+  const auto a = std::make_shared<Image<std::uint8_t>> (
+      options.mirrors.width, options.mirrors.height);
+  const auto b = std::make_shared<Image<std::uint8_t>> (*a);
+  EXPECT_TRUE (picture_of (a, b) == picture_of (b, a));
+}
+
 TEST (SickBench, TheExposureIsWhereTheTruthHasIt)
 {
   for (const char *words : {"delay=100us", "exposure-late=3ms",

@@ -28,98 +28,78 @@ struct CommandText {
 };
 
 /** A subcommand: its options, and what it does. */
-class Command
-{
-public:
-  virtual ~Command () = default;
-
-  virtual CommandText text () const = 0;
+struct Command {
+  CommandText text;
   /** Declares its options and how they exclude or need each other. */
-  virtual void declare (Options &options) = 0;
+  std::function<void (Options &)> declare;
   /** After the command line was parsed. Throws Failure. */
-  virtual Exit run () = 0;
-  /** Another program reads its options: run_with () gets them all. */
-  virtual bool parses_itself () const { return false; }
-  virtual void run_with (const std::vector<std::string> &) {}
-  /** Commands of its own, such as "schedule show"; then run () is not called.
-   */
-  virtual std::vector<std::unique_ptr<Command>> commands () { return {}; }
+  std::function<Exit ()> run;
+  /** Commands of its own, such as "schedule show"; then nothing else is run. */
+  std::vector<Command> below = {};
+  /** Another program reads its options: this gets them all. */
+  std::function<void (const std::vector<std::string> &)> run_with = nullptr;
 };
 
-/** A command of a few functions, for those that share their arguments. */
-class SmallCommand : public Command
-{
-public:
-  SmallCommand (CommandText text, std::function<void (Options &)> declare,
-      std::function<Exit ()> run)
-      : text_ (std::move (text)), declare_ (std::move (declare)),
-        run_ (std::move (run))
-  {
-  }
-  CommandText text () const override { return text_; }
-  void declare (Options &options) override { declare_ (options); }
-  Exit run () override { return run_ (); }
-
-private:
-  CommandText text_;
-  std::function<void (Options &)> declare_;
-  std::function<Exit ()> run_;
-};
-
-/** A name with commands below it; Arguments are what those share. */
-template <typename Arguments>
-class CommandGroup : public Command
-{
-public:
-  using Commands = std::vector<std::unique_ptr<Command>>;
-
-  CommandGroup (CommandText text, Commands (*below) (Arguments &))
-      : text_ (std::move (text)), below_ (below)
-  {
-  }
-  CommandText text () const override { return text_; }
-  void declare (Options &) override {}
-  Exit run () override { return Exit::usage; }
-  Commands commands () override { return below_ (arguments_); }
-
-private:
-  CommandText text_;
-  Commands (*below_) (Arguments &);
-  Arguments arguments_;
-};
-
-template <typename T>
-std::unique_ptr<Command>
+/** That of a class with text (), declare () and run (). */
+template <typename Class>
+Command
 make_command ()
 {
-  return std::make_unique<T> ();
+  const auto made = std::make_shared<Class> ();
+  return {Class::text (),
+      [made] (Options &options) { made->declare (options); },
+      [made] { return made->run (); }};
+}
+
+/** A command below another one; Arguments are what those of a group share. */
+template <typename Arguments>
+struct Below {
+  CommandText text;
+  std::function<void (Options &, Arguments &)> declare;
+  std::function<Exit (Arguments &)> run;
+};
+
+/** A name with commands below it. */
+template <typename Arguments>
+Command
+make_group (CommandText text, const std::vector<Below<Arguments>> &below)
+{
+  const auto arguments = std::make_shared<Arguments> ();
+  Command group{std::move (text), [] (Options &) {}, nullptr};
+  for (const Below<Arguments> &each : below)
+    group.below.push_back ({each.text,
+        [arguments, declare = each.declare] (
+            Options &options) { declare (options, *arguments); },
+        [arguments, run = each.run] { return run (*arguments); }});
+  return group;
 }
 
 /** All of this build, in the order of --help. */
-std::vector<std::unique_ptr<Command>> all_commands ();
+std::vector<Command> all_commands ();
 /** A message: there is none of that name, or not in this build. */
 std::string no_command (const std::string &name);
 
-/* One for each file of commands/; nullptr: this build lacks its libraries. */
-std::unique_ptr<Command> advise_command ();
-std::unique_ptr<Command> archive_command ();
-std::unique_ptr<Command> bench_command ();
-std::unique_ptr<Command> calibrate_command ();
-std::unique_ptr<Command> camera_command ();
-std::unique_ptr<Command> decode_command ();
-std::unique_ptr<Command> dmd_command ();
-std::unique_ptr<Command> doctor_command ();
-std::unique_ptr<Command> live_command ();
-std::unique_ptr<Command> info_command ();
-std::unique_ptr<Command> join_command ();
-std::unique_ptr<Command> pack_command ();
-std::unique_ptr<Command> play_command ();
-std::unique_ptr<Command> profile_command ();
-std::unique_ptr<Command> receive_command ();
-std::unique_ptr<Command> record_command ();
-std::unique_ptr<Command> report_command ();
-std::unique_ptr<Command> schedule_command ();
-std::unique_ptr<Command> send_command ();
-std::unique_ptr<Command> simulate_command ();
+/* One for each file of commands/; without a name: this build lacks its
+ * libraries. */
+Command advise_command ();
+Command archive_command ();
+Command bench_command ();
+Command calibrate_command ();
+Command camera_command ();
+Command decode_command ();
+Command dmd_command ();
+Command doctor_command ();
+Command live_command ();
+Command info_command ();
+Command join_command ();
+Command pack_command ();
+Command play_command ();
+Command profile_command ();
+Command receive_command ();
+Command record_command ();
+Command report_command ();
+Command schedule_command ();
+Command send_command ();
+Command simulate_command ();
 
 } // namespace codedexposure::app

@@ -29,7 +29,7 @@ constexpr std::size_t kPart = std::size_t (1) << 20; ///< bytes read at once
 /** A command, its place on the command line, and its options. */
 struct Node {
   std::string path; ///< "codedexposure schedule show"
-  std::unique_ptr<Command> command;
+  Command command;
   CLI::App *app = nullptr;
   std::unique_ptr<Options> options;
   std::vector<Node> below = {};
@@ -38,13 +38,13 @@ struct Node {
 void
 print_help (const Node &node)
 {
-  const CommandText text = node.command->text ();
+  const CommandText &text = node.command.text;
   std::printf ("Usage: %s %s\n%s", node.path.c_str (), text.usage.c_str (),
       text.description.c_str ());
   if (!node.below.empty ())
     std::printf ("\n");
   for (const Node &below : node.below)
-    if (const CommandText listed = below.command->text ();
+    if (const CommandText &listed = below.command.text;
         !listed.summary.empty ())
       std::printf (
           "  %-18s  %s\n", listed.name.c_str (), listed.summary.c_str ());
@@ -65,25 +65,24 @@ print_commands (const std::vector<Node> &nodes)
                "(DMD).\n\nCommands:\n",
       kName);
   for (const Node &node : nodes)
-    if (const CommandText text = node.command->text (); !text.summary.empty ())
+    if (const CommandText &text = node.command.text; !text.summary.empty ())
       std::printf ("  %-18s  %s\n", text.name.c_str (), text.summary.c_str ());
   std::printf ("\n  -h, --help          show this help, or that of a COMMAND\n"
                "  --version           show the version\n");
 }
 
 Node
-add_node (
-    CLI::App &above, const std::string &path, std::unique_ptr<Command> command)
+add_node (CLI::App &above, const std::string &path, Command command)
 {
-  const CommandText text = command->text ();
+  const CommandText &text = command.text;
   CLI::App *app = above.add_subcommand (text.name, text.summary);
   app->set_help_flag ();
   app->add_flag ("-h,--help");
   Node node{path + " " + text.name, std::move (command), app,
       std::make_unique<Options> (*app)};
-  node.command->declare (*node.options);
-  for (auto &below : node.command->commands ())
-    node.below.push_back (add_node (*app, node.path, std::move (below)));
+  node.command.declare (*node.options);
+  for (const Command &below : node.command.below)
+    node.below.push_back (add_node (*app, node.path, below));
   return node;
 }
 
@@ -167,20 +166,20 @@ run (int argc, char **argv)
   app.add_flag ("--version");
   app.add_flag ("--build"); // after --version: which build it is
   std::vector<Node> nodes;
-  for (auto &command : all_commands ())
-    nodes.push_back (add_node (app, kName, std::move (command)));
+  for (const Command &command : all_commands ())
+    nodes.push_back (add_node (app, kName, command));
 
   std::string path = kName;
   const Node *node = nullptr;
   try {
     for (const Node &each : nodes)
-      if (argc > 1 && each.command->parses_itself () &&
-          each.command->text ().name == argv[1])
-        each.command->run_with ({argv + 2, argv + argc});
+      if (argc > 1 && each.command.run_with &&
+          each.command.text.name == argv[1])
+        each.command.run_with ({argv + 2, argv + argc});
     /* From "--" on, words are another program's, which CLI11 would read. */
     int own = argc;
     for (const Node &each : nodes)
-      if (argc > 1 && each.command->text ().name == argv[1] &&
+      if (argc > 1 && each.command.text.name == argv[1] &&
           each.options->takes_rest ()) {
         own = int (
             std::find (argv + 2, argv + argc, std::string_view ("--")) - argv);
@@ -221,7 +220,7 @@ run (int argc, char **argv)
     if (!node->below.empty ())
       usage_error ("give one of its commands");
     node->options->finish ();
-    return int (node->command->run ());
+    return int (node->command.run ());
   } catch (const Failure &failure) {
     return report (failure, path, node && node->options->has ("--json"));
   }

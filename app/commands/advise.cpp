@@ -226,10 +226,10 @@ advise (Arguments arguments)
   return show (arguments, findings);
 }
 
-class Advise : public Command
+class Advise
 {
 public:
-  CommandText text () const override
+  static CommandText text ()
   {
     return {.name = "advise",
         .summary = "predict the accuracy of schedules and recommend one",
@@ -242,8 +242,8 @@ public:
             "  The best schedule for a fast scene with little light:\n"
             "    codedexposure advise --speed 400 --light 0.3 --dmd dlp3000\n"};
   }
-  void declare (Options &options) override;
-  Exit run () override { return advise (arguments_); }
+  void declare (Options &options);
+  Exit run () { return advise (arguments_); }
 
 private:
   Arguments arguments_;
@@ -291,7 +291,7 @@ Advise::declare (Options &options)
 
 } // namespace
 
-std::unique_ptr<Command>
+Command
 advise_command ()
 {
   return make_command<Advise> ();

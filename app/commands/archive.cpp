@@ -7,34 +7,16 @@
 namespace codedexposure::app
 {
 
-namespace
-{
-
-class Archive : public Command
-{
-public:
-  CommandText text () const override
-  {
-    return {.name = "archive",
-        .summary = "decode many recordings on many cores or computers",
-        .usage = "",
-        .description = ""};
-  }
-  void declare (Options &) override {}
-  Exit run () override { return Exit::usage; }
-  bool parses_itself () const override { return true; }
-  void run_with (const std::vector<std::string> &words) override
-  {
-    become_archive (words);
-  }
-};
-
-} // namespace
-
-std::unique_ptr<Command>
+Command
 archive_command ()
 {
-  return make_command<Archive> ();
+  return {.text = {.name = "archive",
+              .summary = "decode many recordings on many cores or computers",
+              .usage = "",
+              .description = ""},
+      .declare = [] (Options &) {},
+      .run = [] { return Exit::usage; },
+      .run_with = become_archive};
 }
 
 } // namespace codedexposure::app

@@ -30,12 +30,12 @@ namespace codedexposure::app
 namespace
 {
 
-class Bench : public Command
+class Bench
 {
 public:
-  CommandText text () const override;
-  void declare (Options &options) override;
-  Exit run () override;
+  static CommandText text ();
+  void declare (Options &options);
+  Exit run ();
 
 private:
   /** A camera, and the scene that it sees. */
@@ -70,7 +70,7 @@ private:
 };
 
 CommandText
-Bench::text () const
+Bench::text ()
 {
   return {.name = "bench",
       .summary = "run a command with an emulated camera, and a board",
@@ -360,7 +360,7 @@ Bench::run ()
 
 } // namespace
 
-std::unique_ptr<Command>
+Command
 bench_command ()
 {
   return make_command<Bench> ();

@@ -20,12 +20,12 @@ namespace
 /* Of a simulated bench, as a part of what saturates its camera. */
 constexpr double kWhite = 0.8;
 
-class Calibrate : public Command
+class Calibrate
 {
 public:
-  CommandText text () const override;
-  void declare (Options &options) override;
-  Exit run () override;
+  static CommandText text ();
+  void declare (Options &options);
+  Exit run ();
 
 private:
   void set_up_bench ();
@@ -43,7 +43,7 @@ private:
 };
 
 CommandText
-Calibrate::text () const
+Calibrate::text ()
 {
   return {.name = "calibrate",
       .summary = "align the camera with the mirrors and measure the mapping",
@@ -220,7 +220,7 @@ Calibrate::run ()
 
 } // namespace
 
-std::unique_ptr<Command>
+Command
 calibrate_command ()
 {
   return make_command<Calibrate> ();

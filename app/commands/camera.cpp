@@ -280,42 +280,13 @@ show (const Arguments &arguments)
   return Exit::done;
 }
 
-CommandGroup<Arguments>::Commands
-commands_below (Arguments &arguments)
-{
-  CommandGroup<Arguments>::Commands commands;
-  commands.push_back (std::make_unique<SmallCommand> (
-      CommandText{.name = "list",
-          .summary = "list the GenICam cameras that answer",
-          .usage = "[option...]",
-          .description =
-              "Lists the GenICam cameras on the network and the USB: the name "
-              "for --camera, the\nsensor, the grey formats, and whether a DMD "
-              "can trigger it.\n"},
-      [&arguments] (Options &options) { arguments.declare (options); },
-      [&arguments] { return list (arguments); }));
-  commands.push_back (std::make_unique<SmallCommand> (
-      CommandText{.name = "show",
-          .summary = "show how a camera is set",
-          .usage = "[option...] CAMERA",
-          .description =
-              "Shows what a camera can do and how it is set, with the features "
-              "that change\ncoded frames. Nothing is changed.\n"},
-      [&arguments] (Options &options) {
-        options.word ("CAMERA", arguments.name);
-        arguments.declare (options);
-      },
-      [&arguments] { return show (arguments); }));
-  return commands;
-}
-
 } // namespace
 
-std::unique_ptr<Command>
+Command
 camera_command ()
 {
-  return std::make_unique<CommandGroup<Arguments>> (
-      CommandText{.name = "camera",
+  return make_group<Arguments> (
+      {.name = "camera",
           .summary = "list the cameras, and show how one is set",
           .usage = "COMMAND [option...] [CAMERA]",
           .description = "GenICam cameras, on GigE Vision and USB3 Vision.\n",
@@ -329,7 +300,26 @@ camera_command ()
                       "  How it is set:\n"
                       "    codedexposure bench codedexposure camera show "
                       "127.0.0.1\n"},
-      commands_below);
+      {{{.name = "list",
+            .summary = "list the GenICam cameras that answer",
+            .usage = "[option...]",
+            .description = "Lists the GenICam cameras on the network and the "
+                           "USB: the name "
+                           "for --camera, the\nsensor, the grey formats, and "
+                           "whether a DMD "
+                           "can trigger it.\n"},
+           [] (Options &options, Arguments &a) { a.declare (options); }, list},
+          {{.name = "show",
+               .summary = "show how a camera is set",
+               .usage = "[option...] CAMERA",
+               .description =
+                   "Shows what a camera can do and how it is set, with the "
+                   "features that change\ncoded frames. Nothing is changed.\n"},
+              [] (Options &options, Arguments &a) {
+                options.word ("CAMERA", a.name);
+                a.declare (options);
+              },
+              show}});
 }
 
 } // namespace codedexposure::app

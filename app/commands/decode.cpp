@@ -23,12 +23,12 @@ namespace codedexposure::app
 namespace
 {
 
-class Decode : public Command
+class Decode
 {
 public:
-  CommandText text () const override;
-  void declare (Options &options) override;
-  Exit run () override;
+  static CommandText text ();
+  void declare (Options &options);
+  Exit run ();
 
 private:
   void declare_relations (Options &options);
@@ -56,7 +56,7 @@ private:
 };
 
 CommandText
-Decode::text () const
+Decode::text ()
 {
   return {.name = "decode",
       .summary = "decode a recording to pictures at N times the frame rate",
@@ -418,7 +418,7 @@ Decode::run ()
 
 } // namespace
 
-std::unique_ptr<Command>
+Command
 decode_command ()
 {
   return make_command<Decode> ();

@@ -379,31 +379,28 @@ constexpr Entry kEntries[] = {
         selftest, {}},
 };
 
-CommandGroup<Arguments>::Commands
-commands_below (Arguments &arguments)
-{
-  CommandGroup<Arguments>::Commands commands;
-  for (const Entry &entry : kEntries)
-    commands.push_back (std::make_unique<SmallCommand> (
-        CommandText{.name = entry.name,
-            .summary = entry.summary,
-            .usage = entry.takes.no_device  ? "[option...]"
-                     : entry.takes.schedule ? "[option...] [DEVICE] [SCHEDULE]"
-                                            : "[option...] [DEVICE]",
-            .description = entry.description},
-        [&arguments, &entry] (
-            Options &options) { declare (options, arguments, entry.takes); },
-        [&arguments, &entry] { return run_command (arguments, entry.run); }));
-  return commands;
-}
-
 } // namespace
 
-std::unique_ptr<Command>
+Command
 dmd_command ()
 {
-  return std::make_unique<CommandGroup<Arguments>> (
-      CommandText{.name = "dmd",
+  std::vector<Below<Arguments>> below;
+  for (const Entry &entry : kEntries)
+    below.push_back (
+        {{.name = entry.name,
+             .summary = entry.summary,
+             .usage = entry.takes.no_device  ? "[option...]"
+                      : entry.takes.schedule ? "[option...] [DEVICE] [SCHEDULE]"
+                                             : "[option...] [DEVICE]",
+             .description = entry.description},
+            [&entry] (Options &options, Arguments &arguments) {
+              declare (options, arguments, entry.takes);
+            },
+            [&entry] (Arguments &arguments) {
+              return run_command (arguments, entry.run);
+            }});
+  return make_group<Arguments> (
+      {.name = "dmd",
           .summary = "list and control DMD boards",
           .usage = "COMMAND [option...] [DEVICE]",
           .description =
@@ -416,7 +413,7 @@ dmd_command ()
                    "interrupted.\n",
           .examples = "  A test of a board, here of the simulated one:\n"
                       "    codedexposure dmd selftest sim:bench\n"},
-      commands_below);
+      below);
 }
 
 } // namespace codedexposure::app

@@ -30,12 +30,12 @@ namespace codedexposure::app
 namespace
 {
 
-class Doctor : public Command
+class Doctor
 {
 public:
-  CommandText text () const override;
-  void declare (Options &options) override;
-  Exit run () override;
+  static CommandText text ();
+  void declare (Options &options);
+  Exit run ();
 
 private:
   bool asks () const
@@ -76,7 +76,7 @@ private:
 };
 
 CommandText
-Doctor::text () const
+Doctor::text ()
 {
   return {.name = "doctor",
       .summary = "examine a bench, and measure its numbers",
@@ -431,7 +431,7 @@ Doctor::run ()
 
 } // namespace
 
-std::unique_ptr<Command>
+Command
 doctor_command ()
 {
   return make_command<Doctor> ();

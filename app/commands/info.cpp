@@ -27,10 +27,10 @@ codec_text (MatroskaHead::Codec codec)
   }
 }
 
-class Info : public Command
+class Info
 {
 public:
-  CommandText text () const override
+  static CommandText text ()
   {
     return {.name = "info",
         .summary = "show what a recording says of itself",
@@ -50,7 +50,7 @@ public:
                     "    codedexposure info --json --times coded.mkv\n"};
   }
 
-  void declare (Options &options) override
+  void declare (Options &options)
   {
     options.words (paths_);
     options.heading ("");
@@ -58,7 +58,7 @@ public:
     printing_.declare (options);
   }
 
-  Exit run () override
+  Exit run ()
   {
     if (paths_.empty ())
       usage_error ("give a RECORDING.mkv");
@@ -113,7 +113,7 @@ private:
 
 } // namespace
 
-std::unique_ptr<Command>
+Command
 info_command ()
 {
   return make_command<Info> ();

@@ -246,10 +246,10 @@ private:
   int slot_ = 0, slots_ = 0;
 };
 
-class Join : public Command
+class Join
 {
 public:
-  CommandText text () const override
+  static CommandText text ()
   {
     return {.name = "join",
         .summary = "",
@@ -259,7 +259,7 @@ public:
             "would have written\nthem, and prints what they hold as JSON.\n"};
   }
 
-  void declare (Options &options) override
+  void declare (Options &options)
   {
     options.words (parts_);
     options.heading ("");
@@ -274,7 +274,7 @@ public:
     run_.declare (options);
   }
 
-  Exit run () override
+  Exit run ()
   {
     if (parts_.empty ())
       usage_error ("give the parts");
@@ -305,7 +305,7 @@ private:
 
 } // namespace
 
-std::unique_ptr<Command>
+Command
 join_command ()
 {
   return make_command<Join> ();

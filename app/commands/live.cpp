@@ -13,12 +13,12 @@ namespace codedexposure::app
 namespace
 {
 
-class Live : public Command
+class Live
 {
 public:
-  CommandText text () const override;
-  void declare (Options &options) override;
-  Exit run () override;
+  static CommandText text ();
+  void declare (Options &options);
+  Exit run ();
 
 private:
   SourcePlan plan ();
@@ -37,7 +37,7 @@ private:
 };
 
 CommandText
-Live::text () const
+Live::text ()
 {
   return {.name = "live",
       .summary = "watch coded frames and subframes in a window",
@@ -179,7 +179,7 @@ Live::run ()
 
 } // namespace
 
-std::unique_ptr<Command>
+Command
 live_command ()
 {
   return make_command<Live> ();

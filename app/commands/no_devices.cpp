@@ -5,22 +5,22 @@
 namespace codedexposure::app
 {
 
-std::unique_ptr<Command>
+Command
 bench_command ()
 {
-  return nullptr;
+  return {};
 }
 
-std::unique_ptr<Command>
+Command
 doctor_command ()
 {
-  return nullptr;
+  return {};
 }
 
-std::unique_ptr<Command>
+Command
 camera_command ()
 {
-  return nullptr;
+  return {};
 }
 
 } // namespace codedexposure::app

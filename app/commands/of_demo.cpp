@@ -6,14 +6,11 @@
 namespace codedexposure::app
 {
 
-std::vector<std::unique_ptr<Command>>
+std::vector<Command>
 all_commands ()
 {
-  std::vector<std::unique_ptr<Command>> commands;
-  for (const auto make : {simulate_command, live_command, record_command,
-           decode_command, play_command})
-    commands.push_back (make ());
-  return commands;
+  return {simulate_command (), live_command (), record_command (),
+      decode_command (), play_command ()};
 }
 
 std::string

@@ -72,12 +72,12 @@ private:
   std::vector<std::string> lines_;
 };
 
-class Pack : public Command
+class Pack
 {
 public:
-  CommandText text () const override;
-  void declare (Options &options) override;
-  Exit run () override;
+  static CommandText text ();
+  void declare (Options &options);
+  Exit run ();
 
 private:
   struct Seen {
@@ -105,7 +105,7 @@ private:
 };
 
 CommandText
-Pack::text () const
+Pack::text ()
 {
   return {.name = "pack",
       .summary = "turn a raw recording into FFV1, checked frame by frame",
@@ -296,7 +296,7 @@ Pack::run ()
 
 } // namespace
 
-std::unique_ptr<Command>
+Command
 pack_command ()
 {
   return make_command<Pack> ();

@@ -17,12 +17,12 @@ namespace codedexposure::app
 namespace
 {
 
-class Play : public Command
+class Play
 {
 public:
-  CommandText text () const override;
-  void declare (Options &options) override;
-  Exit run () override;
+  static CommandText text ();
+  void declare (Options &options);
+  Exit run ();
 
 private:
   Played played () const;
@@ -36,7 +36,7 @@ private:
 };
 
 CommandText
-Play::text () const
+Play::text ()
 {
   return {.name = "play",
       .summary = "watch a recording in a window, and move in it",
@@ -130,7 +130,7 @@ Play::run ()
 
 } // namespace
 
-std::unique_ptr<Command>
+Command
 play_command ()
 {
   return make_command<Play> ();

@@ -29,36 +29,28 @@ show (const Arguments &arguments)
   return Exit::done;
 }
 
-CommandGroup<Arguments>::Commands
-commands_below (Arguments &arguments)
-{
-  CommandGroup<Arguments>::Commands commands;
-  commands.push_back (std::make_unique<SmallCommand> (
-      CommandText{.name = "show",
-          .summary = "check a bench profile and show what it says",
-          .usage = "[option...] [FILE.json]",
-          .description = "Checks the bench profile FILE.json [bench.json], as "
-                         "\"codedexposure doctor\"\nwrites it, and shows what "
-                         "it says; with --json, its JSON form.\n"},
-      [&arguments] (Options &options) {
-        options.word ("FILE.json", arguments.path, true);
-        arguments.declare (options);
-      },
-      [&arguments] { return show (arguments); }));
-  return commands;
-}
-
 } // namespace
 
-std::unique_ptr<Command>
+Command
 profile_command ()
 {
-  return std::make_unique<CommandGroup<Arguments>> (
-      CommandText{.name = "profile",
+  return make_group<Arguments> (
+      {.name = "profile",
           .summary = "show bench profiles",
           .usage = "COMMAND [option...]",
           .description = "Bench profiles are what was measured of a bench.\n"},
-      commands_below);
+      {{{.name = "show",
+            .summary = "check a bench profile and show what it says",
+            .usage = "[option...] [FILE.json]",
+            .description =
+                "Checks the bench profile FILE.json [bench.json], as "
+                "\"codedexposure doctor\"\nwrites it, and shows what "
+                "it says; with --json, its JSON form.\n"},
+          [] (Options &options, Arguments &a) {
+            options.word ("FILE.json", a.path, true);
+            a.declare (options);
+          },
+          show}});
 }
 
 } // namespace codedexposure::app

@@ -17,12 +17,12 @@ namespace codedexposure::app
 namespace
 {
 
-class Receive : public Command
+class Receive
 {
 public:
-  CommandText text () const override;
-  void declare (Options &options) override;
-  Exit run () override;
+  static CommandText text ();
+  void declare (Options &options);
+  Exit run ();
 
 private:
   bool has_window () const { return !output_ && (!coded_ || window_.sink); }
@@ -41,7 +41,7 @@ private:
 constexpr double kWait = 10; // s
 
 CommandText
-Receive::text () const
+Receive::text ()
 {
   return {.name = "receive",
       .summary = "receive coded frames, to watch or to keep them",
@@ -166,7 +166,7 @@ Receive::run ()
 
 } // namespace
 
-std::unique_ptr<Command>
+Command
 receive_command ()
 {
   return make_command<Receive> ();

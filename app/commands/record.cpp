@@ -13,10 +13,10 @@ namespace codedexposure::app
 namespace
 {
 
-class Record : public Command
+class Record
 {
 public:
-  CommandText text () const override
+  static CommandText text ()
   {
     return {.name = "record",
         .summary = "record the coded frames of a camera",
@@ -46,7 +46,7 @@ public:
             "--output camera.mkv\n"};
   }
 
-  void declare (Options &options) override
+  void declare (Options &options)
   {
     options.heading ("");
     options.value ("--output", output_, "FILE.mkv", "the recording",
@@ -78,7 +78,7 @@ public:
     run_.declare (options);
   }
 
-  Exit run () override
+  Exit run ()
   {
     if (second_ || both_)
       beside_.check (source_);
@@ -142,7 +142,7 @@ private:
 
 } // namespace
 
-std::unique_ptr<Command>
+Command
 record_command ()
 {
   return make_command<Record> ();

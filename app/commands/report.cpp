@@ -40,12 +40,12 @@ line_rule ()
       "row:50%, column:50% or 10%/20%/90%/80%, in percent"};
 }
 
-class Report : public Command
+class Report
 {
 public:
-  CommandText text () const override;
-  void declare (Options &options) override;
-  Exit run () override;
+  static CommandText text ();
+  void declare (Options &options);
+  Exit run ();
 
 private:
   void check_end (const RunResult &result);
@@ -65,7 +65,7 @@ private:
 };
 
 CommandText
-Report::text () const
+Report::text ()
 {
   return {.name = "report",
       .summary = "write a page with pictures and figures of a recording",
@@ -271,7 +271,7 @@ Report::run ()
 
 } // namespace
 
-std::unique_ptr<Command>
+Command
 report_command ()
 {
   return make_command<Report> ();

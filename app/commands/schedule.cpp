@@ -181,16 +181,6 @@ render (const Arguments &arguments)
 }
 
 void
-declare (Options &options, Arguments &arguments, bool board, bool rate)
-{
-  options.word ("SCHEDULE", arguments.schedule, true);
-  if (board)
-    arguments.declare_board (options);
-  if (rate)
-    arguments.declare_rate (options);
-}
-
-void
 declare_pictures (Options &options, Arguments &arguments)
 {
   options.value ("--layout", arguments.layout, "L",
@@ -209,21 +199,12 @@ declare_pictures (Options &options, Arguments &arguments)
   options.flag ("--force", arguments.force, "replace files that exist");
 }
 
-CommandGroup<Arguments>::Commands
-commands_below (Arguments &arguments)
+} // namespace
+
+Command
+schedule_command ()
 {
-  CommandGroup<Arguments>::Commands commands;
-  const auto add = [&] (CommandText text, Exit (*run) (const Arguments &),
-                       auto declare_options) {
-    commands.push_back (std::make_unique<SmallCommand> (
-        std::move (text),
-        [&arguments, declare_options] (Options &options) {
-          declare_options (options, arguments);
-          arguments.declare (options);
-        },
-        [&arguments, run] { return run (arguments); }));
-  };
-  add (
+  const Below<Arguments> shows{
       {.name = "show",
           .summary = "show what a schedule means",
           .usage = "[option...] [SCHEDULE]",
@@ -231,54 +212,57 @@ commands_below (Arguments &arguments)
                          "JSON form, which can be\nedited.\n",
           .examples = "  A schedule to edit:\n"
                       "    codedexposure schedule show --json staircase:2x2\n"},
-      show, [] (Options &options, Arguments &a) {
-        declare (options, a, false, false);
-      });
-  add ({.name = "check",
-           .summary = "check whether it fits a DMD and a frame rate",
-           .usage = "[option...] [SCHEDULE]",
-           .description = "Checks whether a board can show a schedule at a "
-                          "frame rate. Exit status 4: it\ncannot.\n",
-           .examples = "  256 slots at 25 frames/s:\n"
-                       "    codedexposure schedule check sequential:16x16 "
-                       "--dmd dlp6500 --rate 25\n"},
-      check, [] (Options &options, Arguments &a) {
-        declare (options, a, true, true);
-      });
-  add ({.name = "render",
-           .summary = "write the masks as bitmap files",
-           .usage = "[option...] [SCHEDULE]",
-           .description =
-               "Writes the masks of a schedule as files PREFIX0.bmp, "
-               "PREFIX1.bmp ... For a\nViALUX board (alp:WIDTHxHEIGHT), "
-               "writes PREFIX.bin, its bit planes, and\nPREFIX.py, a program "
-               "for its Python binding that shows them.\n",
-           .examples = "  The four masks of the default:\n"
-                       "    codedexposure schedule render sequential:2x2 "
-                       "--output mask\n"
-                       "  For a ViALUX board of 1024x768 mirrors:\n"
-                       "    codedexposure schedule render sequential:2x2 "
-                       "--dmd alp:1024x768\n"},
-      render, [] (Options &options, Arguments &a) {
-        declare (options, a, true, false);
+      [] (Options &options, Arguments &a) {
+        options.word ("SCHEDULE", a.schedule, true);
+        a.declare (options);
+      },
+      show};
+  const Below<Arguments> checks{
+      {.name = "check",
+          .summary = "check whether it fits a DMD and a frame rate",
+          .usage = "[option...] [SCHEDULE]",
+          .description = "Checks whether a board can show a schedule at a "
+                         "frame rate. Exit status 4: it\ncannot.\n",
+          .examples = "  256 slots at 25 frames/s:\n"
+                      "    codedexposure schedule check sequential:16x16 "
+                      "--dmd dlp6500 --rate 25\n"},
+      [] (Options &options, Arguments &a) {
+        options.word ("SCHEDULE", a.schedule, true);
+        a.declare_board (options);
+        a.declare_rate (options);
+        a.declare (options);
+      },
+      check};
+  const Below<Arguments> renders{
+      {.name = "render",
+          .summary = "write the masks as bitmap files",
+          .usage = "[option...] [SCHEDULE]",
+          .description =
+              "Writes the masks of a schedule as files PREFIX0.bmp, "
+              "PREFIX1.bmp ... For a\nViALUX board (alp:WIDTHxHEIGHT), "
+              "writes PREFIX.bin, its bit planes, and\nPREFIX.py, a program "
+              "for its Python binding that shows them.\n",
+          .examples = "  The four masks of the default:\n"
+                      "    codedexposure schedule render sequential:2x2 "
+                      "--output mask\n"
+                      "  For a ViALUX board of 1024x768 mirrors:\n"
+                      "    codedexposure schedule render sequential:2x2 "
+                      "--dmd alp:1024x768\n"},
+      [] (Options &options, Arguments &a) {
+        options.word ("SCHEDULE", a.schedule, true);
+        a.declare_board (options);
         declare_pictures (options, a);
-      });
-  return commands;
-}
-
-} // namespace
-
-std::unique_ptr<Command>
-schedule_command ()
-{
-  return std::make_unique<CommandGroup<Arguments>> (
-      CommandText{.name = "schedule",
+        a.declare (options);
+      },
+      render};
+  return make_group<Arguments> (
+      {.name = "schedule",
           .summary = "show and check schedules, write their masks",
           .usage = "COMMAND [option...] [SCHEDULE]",
           .description =
               "SCHEDULE is CODE:TILE[,key=value...] or the path of a "
               "JSON file\n[sequential:2x2].\n"},
-      commands_below);
+      {shows, checks, renders});
 }
 
 } // namespace codedexposure::app

@@ -11,12 +11,12 @@ namespace codedexposure::app
 namespace
 {
 
-class Send : public Command
+class Send
 {
 public:
-  CommandText text () const override;
-  void declare (Options &options) override;
-  Exit run () override;
+  static CommandText text ();
+  void declare (Options &options);
+  Exit run ();
 
 private:
   void add_server (Job &job, Chain &frames) const;
@@ -30,7 +30,7 @@ private:
 };
 
 CommandText
-Send::text () const
+Send::text ()
 {
   return {.name = "send",
       .summary = "send the coded frames of a camera to other machines",
@@ -112,7 +112,7 @@ Send::run ()
 
 } // namespace
 
-std::unique_ptr<Command>
+Command
 send_command ()
 {
   return make_command<Send> ();

@@ -12,10 +12,10 @@ namespace codedexposure::app
 namespace
 {
 
-class Simulate : public Command
+class Simulate
 {
 public:
-  CommandText text () const override
+  static CommandText text ()
   {
     return {.name = "simulate",
         .summary = "record a scene through the simulated bench",
@@ -36,7 +36,7 @@ public:
             "      --schedule sequential:4x2 --output video.mkv\n"};
   }
 
-  void declare (Options &options) override
+  void declare (Options &options)
   {
     options.heading ("");
     options.value ("--output", output_, "FILE.mkv", "the recording",
@@ -46,7 +46,7 @@ public:
     run_.declare (options);
   }
 
-  Exit run () override
+  Exit run ()
   {
     constexpr int kFrames = 100; // of a scene that has no end
     start_gstreamer ();
@@ -70,7 +70,7 @@ private:
 
 } // namespace
 
-std::unique_ptr<Command>
+Command
 simulate_command ()
 {
   return make_command<Simulate> ();

@@ -2,13 +2,13 @@
 /* codedexposure decode: a recording to subframes, or to full-size frames. */
 #include <atomic>
 #include <cmath>
-#include <memory>
 
 #include "command.h"
 #include "common/meta.h"
 #include "options/picture.h"
 #include "pipeline/decoder.h"
 #include "pipeline/messages.h"
+#include "pipeline/pads.h"
 #include "pipeline/partner_seek.h"
 #include "pipeline/plugin.h"
 #include "pipeline/python.h"
@@ -35,11 +35,11 @@ private:
   void check () const;
   PlayTimes times () const;
   VideoStyle style () const;
-  void count_flags (GstElement *queue, const std::string &output) const;
+  void count_flags (GstElement *queue, const std::string &output);
   Chain read (Job &job) const;
-  void build (Job &job) const;
+  void build (Job &job);
   void build_search (Job &job) const;
-  RunResult play_once (bool salvage, bool &found) const;
+  RunResult play_once (bool salvage, bool &found);
   [[noreturn]] void decode_on_cores () const;
 
   std::string recording_;
@@ -51,8 +51,7 @@ private:
   std::optional<int> region_, white_, threads_, jobs_;
   bool deflate_ = false, view_ = false, find_phase_ = false;
   /* Pictures whose flags are lost with their form. */
-  std::shared_ptr<std::atomic<guint64>> unflagged_ =
-      std::make_shared<std::atomic<guint64>> (0);
+  std::atomic<guint64> unflagged_ = 0;
 };
 
 CommandText
@@ -228,20 +227,16 @@ Decode::style () const
 
 /* Of pictures that go to .mp4, which has no place for flags. */
 void
-Decode::count_flags (GstElement *queue, const std::string &output) const
+Decode::count_flags (GstElement *queue, const std::string &output)
 {
   if (form_of (output) != VideoForm::mp4 || statistics_)
     return;
-  gst_pad_add_probe (
-      pad_of (queue, "src").get (), GST_PAD_PROBE_TYPE_BUFFER,
-      [] (GstPad *, GstPadProbeInfo *info, gpointer count) {
-        GstBuffer *picture = GST_PAD_PROBE_INFO_BUFFER (info);
+  watch_buffers (
+      pad_of (queue, "src").get (), [this] (GstPad *, GstBuffer *picture) {
         const auto meta = gst::get_frame_meta (picture);
         if (gst::is_corrupted (picture) || (meta && meta->locked == false))
-          static_cast<std::atomic<guint64> *> (count)->fetch_add (1);
-        return GST_PAD_PROBE_OK;
-      },
-      unflagged_.get (), nullptr);
+          unflagged_++;
+      });
 }
 
 /* With those of the second camera, if there is one. */
@@ -264,9 +259,9 @@ Decode::read (Job &job) const
 }
 
 void
-Decode::build (Job &job) const
+Decode::build (Job &job)
 {
-  *unflagged_ = 0;
+  unflagged_ = 0;
   Chain frames = read (job);
   if (threads_)
     g_object_set (job.reader, "threads", guint (*threads_), nullptr);
@@ -316,7 +311,7 @@ Decode::build_search (Job &job) const
 }
 
 RunResult
-Decode::play_once (bool salvage, bool &found) const
+Decode::play_once (bool salvage, bool &found)
 {
   Job job ("decode", run_);
   job.salvage = salvage;
@@ -403,12 +398,12 @@ Decode::run ()
         .line (
             recording_ + (second_ ? " or " + *second_ : "") +
             " is cut off or damaged; what could be decoded was" +
-            (*unflagged_ > 0 ? ""
-                             : ", and pictures of damaged frames are flagged"));
-  if (*unflagged_ > 0)
+            (unflagged_ > 0 ? ""
+                            : ", and pictures of damaged frames are flagged"));
+  if (unflagged_ > 0)
     Status ("decode", false)
         .line (".mp4 has no place for the flags of " +
-               std::to_string (*unflagged_) +
+               std::to_string (unflagged_) +
                " pictures of damaged or unsynchronised frames; add "
                "--statistics FILE.csv, which lists them, or use another form");
   if (find_phase_ && result.exit == Exit::done && !found && !run_.print)

@@ -12,8 +12,8 @@
 
 #include "command.h"
 #include "common/meta.h"
-#include "common/tag.h"
 #include "pipeline/messages.h"
+#include "pipeline/pads.h"
 #include "pipeline/plugin.h"
 #include "pipeline/recording.h"
 #include "pipeline/video_output.h"
@@ -63,12 +63,7 @@ public:
   /** How the pictures were made, among others. */
   std::vector<EventPtr> tags () const
   {
-    const ObjectPtr<GstPad> pad = pad_of (GST_ELEMENT (sink_), "sink");
-    std::vector<EventPtr> all;
-    while (GstEvent *event = gst_pad_get_sticky_event (
-               pad.get (), GST_EVENT_TAG, all.size ()))
-      all.emplace_back (event);
-    return all;
+    return tags_at (pad_of (GST_ELEMENT (sink_), "sink").get ());
   }
   /** After next(). */
   GstClockTime duration () const
@@ -178,11 +173,7 @@ private:
   void pass_tags ()
   {
     std::vector<EventPtr> tags = part_->tags ();
-    std::optional<Provenance> made;
-    for (const EventPtr &event : tags)
-      if (const auto said = provenance_from_tags (tags_of (event.get ()));
-          said && *said)
-        made = said->value ();
+    std::optional<Provenance> made = provenance_in (tags);
     if (made && made_ && made->first_frame == frame_) {
       Provenance whole = *made;
       whole.first_frame = made_->first_frame;

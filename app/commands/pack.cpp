@@ -14,6 +14,7 @@
 #include "common/partner.h"
 #include "common/record.h"
 #include "pipeline/messages.h"
+#include "pipeline/pads.h"
 #include "pipeline/plugin.h"
 #include "pipeline/recording.h"
 #include "pipeline/status.h"
@@ -28,49 +29,26 @@ namespace fs = std::filesystem;
 namespace
 {
 
-/** What is known of each frame that passes a pad, and of its partner, with the
- * hashes of their pixels;
- * changed by the streaming thread until the pipeline has stopped. */
-class FrameLog
+/* Adds to @lines what is known of each frame that passes, and of its partner,
+ * with the hashes of their pixels, until the pipeline has stopped. */
+void
+log_frames (GstElement *element, std::vector<std::string> &lines)
 {
-public:
-  explicit FrameLog (GstElement *element)
-  {
-    gst_pad_add_probe (
-        pad_of (element, "sink").get (), GST_PAD_PROBE_TYPE_BUFFER,
-        [] (GstPad *pad, GstPadProbeInfo *info, gpointer self) {
-          static_cast<FrameLog *> (self)->add (
-              pad, GST_PAD_PROBE_INFO_BUFFER (info));
-          return GST_PAD_PROBE_OK;
-        },
-        this, nullptr);
-  }
-  FrameLog (const FrameLog &) = delete;
-  FrameLog &operator= (const FrameLog &) = delete;
-
-  const std::vector<std::string> &lines () const { return lines_; }
-
-private:
-  void add (GstPad *pad, GstBuffer *frame)
-  {
-    const CapsPtr caps (gst_pad_get_current_caps (pad));
-    const EventPtr event (gst_pad_get_sticky_event (pad, GST_EVENT_SEGMENT, 0));
-    GstVideoInfo info;
-    const GstSegment *segment = nullptr;
-    if (!caps || !event || !gst_video_info_from_caps (&info, caps.get ()))
+  const auto add = [&lines] (GstPad *pad, GstBuffer *frame) {
+    auto info = video_at (pad);
+    const auto segment = segment_at (pad);
+    if (!info || !segment)
       return;
-    gst_event_parse_segment (event.get (), &segment);
     const auto line = [&] (GstBuffer *of) {
-      return record_of (of, info, *segment, 0, lines_.size ()).to_json ();
+      return record_of (of, *info, *segment, 0, lines.size ()).to_json ();
     };
-    lines_.push_back (line (frame));
+    lines.push_back (line (frame));
     const auto partner = get_partner (frame);
-    if (partner && gst_video_info_from_caps (&info, partner->caps.get ()))
-      lines_.back () += line (partner->buffer.get ());
-  }
-
-  std::vector<std::string> lines_;
-};
+    if (partner && gst_video_info_from_caps (&*info, partner->caps.get ()))
+      lines.back () += line (partner->buffer.get ());
+  };
+  watch_buffers (pad_of (element, "sink").get (), add);
+}
 
 class Pack
 {
@@ -192,10 +170,11 @@ Pack::look_through (const std::string &file)
     Chain chain = read_recording (job, file);
     chain.to ("fakesink", {{"sync", false}});
     job.counted = chain.last ();
-    const FrameLog log (chain.last ());
+    std::vector<std::string> lines;
+    log_frames (chain.last (), lines);
     const RunResult result = play (job);
     if (!result.container_damaged || salvage)
-      return {result, log.lines ()};
+      return {result, std::move (lines)};
   }
 }
 

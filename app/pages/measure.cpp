@@ -4,8 +4,8 @@
 #include "common/meta.h"
 #include "common/partner.h"
 #include "common/stats_report.h"
-#include "common/tag.h"
 #include "pipeline/decoder.h"
+#include "pipeline/pads.h"
 #include "pipeline/recording.h"
 
 namespace codedexposure::app
@@ -32,21 +32,6 @@ numbers_in (const GstStructure *structure, const char *name)
   return numbers;
 }
 
-std::optional<Provenance>
-provenance_at (GstPad *pad)
-{
-  std::optional<Provenance> found;
-  for (guint i = 0;; i++) {
-    const EventPtr event (gst_pad_get_sticky_event (pad, GST_EVENT_TAG, i));
-    if (!event)
-      return found;
-    GstTagList *tags = nullptr;
-    gst_event_parse_tag (event.get (), &tags);
-    if (const auto here = provenance_from_tags (tags); here && *here)
-      found = **here;
-  }
-}
-
 /* A chain's end that measures into @stream. */
 void
 add_meter (Chain chain, const MeasureOptions &options, MeasuredStream &stream,
@@ -58,14 +43,9 @@ add_meter (Chain chain, const MeasureOptions &options, MeasuredStream &stream,
   if (!csv.empty ())
     settings.emplace_back ("location", csv);
   chain.to ("queue").to ("subframestats", settings);
-  gst_pad_add_probe (
-      pad_of (chain.last (), "src").get (), GST_PAD_PROBE_TYPE_BUFFER,
-      [] (GstPad *pad, GstPadProbeInfo *info, gpointer of) {
-        static_cast<MeasuredStream *> (of)->add (
-            pad, GST_PAD_PROBE_INFO_BUFFER (info));
-        return GST_PAD_PROBE_OK;
-      },
-      &stream, nullptr);
+  watch_buffers (pad_of (chain.last (), "src").get (),
+      [&stream] (
+          GstPad *pad, GstBuffer *picture) { stream.add (pad, picture); });
   chain.to ("fakesink");
 }
 
@@ -81,14 +61,10 @@ measure_once (const MeasureOptions &options, bool salvage)
   if (options.decode.bits)
     all.coded.bits = all.subframes.bits = *options.decode.bits;
   Chain frames = read_recording (job, options.recording);
-  gst_pad_add_probe (
-      pad_of (job.reader, "src").get (), GST_PAD_PROBE_TYPE_BUFFER,
-      [] (GstPad *, GstPadProbeInfo *info, gpointer pairs) {
-        *static_cast<std::size_t *> (pairs) +=
-            get_partner (GST_PAD_PROBE_INFO_BUFFER (info)).has_value ();
-        return GST_PAD_PROBE_OK;
-      },
-      &all.pairs, nullptr);
+  watch_buffers (
+      pad_of (job.reader, "src").get (), [&all] (GstPad *, GstBuffer *frame) {
+        all.pairs += get_partner (frame).has_value ();
+      });
   const DecoderPads pads = add_demux (job, frames, options.decode, {});
   add_meter (pads.pictures, options, all.subframes, options.subframes_csv);
   add_meter (pads.coded (), options, all.coded, options.coded_csv);
@@ -101,18 +77,15 @@ measure_once (const MeasureOptions &options, bool salvage)
 void
 MeasuredStream::add (GstPad *pad, GstBuffer *picture)
 {
-  const CapsPtr caps (gst_pad_get_current_caps (pad));
-  GstVideoInfo info;
-  if (pictures.empty () && caps &&
-      gst_video_info_from_caps (&info, caps.get ())) {
+  if (const auto info = video_at (pad); pictures.empty () && info) {
     const auto meta = get_frame_meta (picture);
-    const int depth = int (GST_VIDEO_INFO_COMP_DEPTH (&info, 0));
-    const int known = meta ? significant_bits_of (meta->bits, info) : 0;
+    const int depth = int (GST_VIDEO_INFO_COMP_DEPTH (&*info, 0));
+    const int known = meta ? significant_bits_of (meta->bits, *info) : 0;
     if (bits == 0)
       bits = known > 0 ? known : depth;
-    size = {info.width, info.height};
-    rate = {info.fps_n, info.fps_d};
-    provenance = provenance_at (pad);
+    size = {info->width, info->height};
+    rate = {info->fps_n, info->fps_d};
+    provenance = provenance_in (tags_at (pad));
   }
   MeasuredPicture measured;
   auto *meta = gst_buffer_get_custom_meta (picture, kStatsMetaName);
@@ -121,11 +94,9 @@ MeasuredStream::add (GstPad *pad, GstBuffer *picture)
   const GstStructure *fields = gst_custom_meta_get_structure (meta);
   if (!read_fields (fields, measured))
     return;
-  const EventPtr segment (gst_pad_get_sticky_event (pad, GST_EVENT_SEGMENT, 0));
-  const GstSegment *times = nullptr;
-  gst_event_parse_segment (segment.get (), &times);
+  const auto segment = segment_at (pad);
   measured.pts =
-      gst_segment_to_stream_time (times, GST_FORMAT_TIME, measured.pts);
+      gst_segment_to_stream_time (&*segment, GST_FORMAT_TIME, measured.pts);
   measured.damaged =
       GST_BUFFER_FLAG_IS_SET (picture, GST_BUFFER_FLAG_CORRUPTED);
   if (details) {

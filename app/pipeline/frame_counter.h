@@ -57,22 +57,17 @@ public:
   void end ();
 
 private:
+  gst::ObjectPtr<GstElement> element () const;
+  void hold_first_frame ();
   void seek ();
-  static gboolean on_held (gpointer self);
-  static GstPadProbeReturn hold_first_frame (
-      GstPad *, GstPadProbeInfo *, gpointer self);
-  static GstPadProbeReturn shift_first_frame (
-      GstPad *pad, GstPadProbeInfo *info, gpointer self);
-  static GstPadProbeReturn on_frame (
-      GstPad *, GstPadProbeInfo *info, gpointer self);
+  void count (GstBuffer *frame);
 
   const gst::ObjectPtr<GstPad> pad_;
-  PlayTimes times_; // changed before the first frame passes
+  const PlayTimes times_;
   const std::function<void ()> cannot_seek_;
   std::atomic<gint64> frames_ = 0;
   std::atomic<gint64> last_ = -1; // position, ns
-  gulong hold_ = 0;   // probe that holds the first frame until the seek
-  bool held_ = false; // streaming thread
+  gulong hold_ = 0; // probe that holds the first frame until the seek
 };
 
 } // namespace codedexposure::app

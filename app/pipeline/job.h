@@ -83,8 +83,6 @@ struct Job {
   std::vector<GstElement *> recorders;
   /** If the recording behind the only buffer fails, the rest goes on. */
   bool buffer_may_fail = false;
-  /** Identities with eos-after, behind which streams end. */
-  std::vector<GstElement *> limits;
   /** A tcpserversink. */
   GstElement *server = nullptr;
   /** Frames begin when the server has a receiver. */

@@ -6,8 +6,9 @@
 
 #include <gst/gst.h>
 
-#include "common/raii.h"
+#include "pipeline/graph.h"
 #include "pipeline/messages.h"
+#include "pipeline/pads.h"
 
 namespace codedexposure::app
 {
@@ -18,8 +19,10 @@ class LeakyQueue
 public:
   explicit LeakyQueue (GstElement *queue) : name_ (GST_OBJECT_NAME (queue))
   {
-    count (queue, "sink", in_);
-    count (queue, "src", out_);
+    watch_buffers (pad_of (queue, "sink").get (),
+        [this] (GstPad *, GstBuffer *) { in_++; });
+    watch_buffers (pad_of (queue, "src").get (),
+        [this] (GstPad *, GstBuffer *) { out_++; });
   }
   LeakyQueue (const LeakyQueue &) = delete;
   LeakyQueue &operator= (const LeakyQueue &) = delete;
@@ -31,20 +34,6 @@ public:
   }
 
 private:
-  static void count (
-      GstElement *queue, const char *pad_name, std::atomic<gint64> &buffers)
-  {
-    const gst::ObjectPtr<GstPad> pad (
-        gst_element_get_static_pad (queue, pad_name));
-    gst_pad_add_probe (
-        pad.get (), GST_PAD_PROBE_TYPE_BUFFER,
-        [] (GstPad *, GstPadProbeInfo *, gpointer counter) {
-          (*static_cast<std::atomic<gint64> *> (counter))++;
-          return GST_PAD_PROBE_OK;
-        },
-        &buffers, nullptr);
-  }
-
   std::string name_;
   std::atomic<gint64> in_ = 0, out_ = 0;
 };

@@ -12,6 +12,7 @@
 
 #include "failure.h"
 #include "pipeline/graph.h"
+#include "pipeline/pads.h"
 #include "pipeline/pictures.h"
 #include "record/matroska.h"
 
@@ -67,13 +68,8 @@ public:
       return claimed;
     g_object_set (element_, property_, part_.path ().c_str (), nullptr);
     if (pad_)
-      gst_pad_add_probe (
-          pad_.get (), GST_PAD_PROBE_TYPE_BUFFER,
-          [] (GstPad *, GstPadProbeInfo *, gpointer frames) {
-            (*static_cast<std::atomic<guint64> *> (frames))++;
-            return GST_PAD_PROBE_OK;
-          },
-          &frames_, nullptr);
+      watch_buffers (
+          pad_.get (), [this] (GstPad *, GstBuffer *) { frames_++; });
     return {};
   }
   void name_element () override

@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "common/meta.h"
-#include "common/raii.h"
+#include "pipeline/pads.h"
 
 namespace codedexposure::app
 {
@@ -24,18 +24,15 @@ struct Turner {
   Zero coded = kUnknown, partners = kUnknown;
   std::atomic<bool> says_exposures = false;
 };
-using Held = std::shared_ptr<Turner>; // by both probes
 
 /* A quarter of the frame period, by which partners may be apart. */
 gint64
 slack_at (GstPad *pad)
 {
-  const CapsPtr caps (gst_pad_get_current_caps (pad));
-  GstVideoInfo info;
-  if (!caps || !gst_video_info_from_caps (&info, caps.get ()) ||
-      info.fps_n <= 0)
-    return 0;
-  return GST_SECOND * info.fps_d / (4 * gint64 (info.fps_n));
+  const auto info = video_at (pad);
+  return info && info->fps_n > 0
+             ? GST_SECOND * info->fps_d / (4 * gint64 (info->fps_n))
+             : 0;
 }
 
 GstEvent *
@@ -68,33 +65,23 @@ follow (GstEvent *event, Zero &zero)
     zero = gint64 (segment->start) - gint64 (segment->time);
 }
 
-GstPadProbeReturn
-on_coded (GstPad *, GstPadProbeInfo *info, gpointer held)
+void
+watch_partners (Turner &turner, GstPad *pad, GstPadProbeInfo *info)
 {
-  follow (
-      GST_PAD_PROBE_INFO_EVENT (info), (*static_cast<Held *> (held))->coded);
-  return GST_PAD_PROBE_OK;
-}
-
-GstPadProbeReturn
-on_partners (GstPad *pad, GstPadProbeInfo *info, gpointer held)
-{
-  const Held &self = *static_cast<Held *> (held);
   if (GST_PAD_PROBE_INFO_TYPE (info) & GST_PAD_PROBE_TYPE_BUFFER) {
     const auto meta = get_frame_meta (GST_PAD_PROBE_INFO_BUFFER (info));
-    self->says_exposures =
+    turner.says_exposures =
         meta && GST_CLOCK_TIME_IS_VALID (meta->exposure_start);
-    return GST_PAD_PROBE_OK;
+    return;
   }
   GstEvent *event = GST_PAD_PROBE_INFO_EVENT (info);
-  follow (event, self->partners);
-  const gint64 coded = self->coded, partners = self->partners;
-  if (GST_EVENT_TYPE (event) != GST_EVENT_SEEK || !self->says_exposures ||
+  follow (event, turner.partners);
+  const gint64 coded = turner.coded, partners = turner.partners;
+  if (GST_EVENT_TYPE (event) != GST_EVENT_SEEK || !turner.says_exposures ||
       coded == kUnknown || partners == kUnknown)
-    return GST_PAD_PROBE_OK;
+    return;
   info->data = turned (event, coded - partners, slack_at (pad));
   gst_event_unref (event);
-  return GST_PAD_PROBE_OK;
 }
 
 } // namespace
@@ -102,14 +89,18 @@ on_partners (GstPad *pad, GstPadProbeInfo *info, gpointer held)
 void
 turn_seeks (GstElement *partners, GstPad *coded)
 {
-  const auto turner = std::make_shared<Turner> ();
-  const auto watch = [&turner] (GstPad *pad, int what, GstPadProbeCallback on) {
-    gst_pad_add_probe (pad, GstPadProbeType (what), on, new Held (turner),
-        [] (gpointer held) { delete static_cast<Held *> (held); });
-  };
-  watch (coded, GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, on_coded);
-  watch (pad_of (partners, "src").get (),
-      GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_BOTH, on_partners);
+  const auto turner = std::make_shared<Turner> (); // of both probes
+  add_probe (coded, GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
+      [turner] (GstPad *, GstPadProbeInfo *info) {
+        follow (GST_PAD_PROBE_INFO_EVENT (info), turner->coded);
+        return GST_PAD_PROBE_OK;
+      });
+  add_probe (pad_of (partners, "src").get (),
+      GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_BOTH,
+      [turner] (GstPad *pad, GstPadProbeInfo *info) {
+        watch_partners (*turner, pad, info);
+        return GST_PAD_PROBE_OK;
+      });
 }
 
 } // namespace codedexposure::app

@@ -14,6 +14,7 @@
 
 #include "pipeline/graph.h"
 #include "pipeline/messages.h"
+#include "pipeline/pads.h"
 
 namespace codedexposure::app
 {
@@ -48,12 +49,9 @@ rate_at (GstPad *pad)
 GstClockTime
 stream_time (GstPad *pad, GstClockTime time)
 {
-  const EventPtr event (gst_pad_get_sticky_event (pad, GST_EVENT_SEGMENT, 0));
-  const GstSegment *segment = nullptr;
-  if (!event)
-    return time;
-  gst_event_parse_segment (event.get (), &segment);
-  return gst_segment_to_stream_time (segment, GST_FORMAT_TIME, time);
+  const auto segment = segment_at (pad);
+  return segment ? gst_segment_to_stream_time (&*segment, GST_FORMAT_TIME, time)
+                 : time;
 }
 
 /* Whether @path is a PNG file up to its last chunk. */
@@ -172,16 +170,10 @@ Pictures::claim (bool replace)
       nullptr);
   write_line ("file,frame,slot,pts_ns,duration_ns,synchronised,corrupted,"
               "lost_before");
-  const ObjectPtr<GstPad> pad (gst_element_get_static_pad (sink_, "sink"));
-  gst_pad_add_probe (
-      pad.get (), GST_PAD_PROBE_TYPE_BUFFER,
-      [] (GstPad *sink_pad, GstPadProbeInfo *info, gpointer self) {
-        static_cast<Pictures *> (self)->add (
-            sink_pad, GST_PAD_PROBE_INFO_BUFFER (info));
-        return GST_PAD_PROBE_OK;
-      },
-      this, nullptr);
-  watch_flags (pad.get ());
+  const ObjectPtr<GstPad> sink = pad_of (sink_, "sink");
+  watch_buffers (sink.get (),
+      [this] (GstPad *pad, GstBuffer *picture) { add (pad, picture); });
+  watch_flags (sink.get ());
   return {};
 }
 
@@ -194,16 +186,10 @@ Pictures::watch_flags (GstPad *sink_pad)
       from ? gst_pad_get_parent_element (from.get ()) : nullptr);
   const ObjectPtr<GstPad> pad (
       encoder ? gst_element_get_static_pad (encoder.get (), "sink") : nullptr);
-  if (!pad)
-    return;
-  gst_pad_add_probe (
-      pad.get (), GST_PAD_PROBE_TYPE_BUFFER,
-      [] (GstPad *, GstPadProbeInfo *info, gpointer self) {
-        static_cast<Pictures *> (self)->corrupted_ =
-            is_corrupted (GST_PAD_PROBE_INFO_BUFFER (info));
-        return GST_PAD_PROBE_OK;
-      },
-      this, nullptr);
+  if (pad)
+    watch_buffers (pad.get (), [this] (GstPad *, GstBuffer *picture) {
+      corrupted_ = is_corrupted (picture);
+    });
 }
 
 /* The slot of the recording, also of a frame that comes late; otherwise, or if

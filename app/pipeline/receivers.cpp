@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "pipeline/graph.h"
+#include "pipeline/pads.h"
 
 namespace codedexposure::app
 {
@@ -58,8 +59,13 @@ Receivers::Receivers (GstElement *sink) : sink_ (sink)
 {
   g_signal_connect (sink, "client-added", G_CALLBACK (on_added), this);
   g_signal_connect (sink, "client-removed", G_CALLBACK (on_removed), this);
-  gst_pad_add_probe (pad_of (sink, "sink").get (),
-      GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, on_event, this, nullptr);
+  add_probe (pad_of (sink, "sink").get (), GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
+      [this] (GstPad *pad, GstPadProbeInfo *info) {
+        if (GST_EVENT_TYPE (gst_pad_probe_info_get_event (info)) ==
+            GST_EVENT_EOS)
+          end (pad);
+        return GST_PAD_PROBE_OK;
+      });
 }
 
 Receivers::~Receivers ()
@@ -105,14 +111,6 @@ Receivers::on_removed (
     shutdown (descriptor, SHUT_WR);
     self->ended_.push_back (dup (descriptor));
   }
-}
-
-GstPadProbeReturn
-Receivers::on_event (GstPad *pad, GstPadProbeInfo *info, gpointer self)
-{
-  if (GST_EVENT_TYPE (gst_pad_probe_info_get_event (info)) == GST_EVENT_EOS)
-    static_cast<Receivers *> (self)->end (pad);
-  return GST_PAD_PROBE_OK;
 }
 
 /* The sink removes each connection when it has sent what waits for it. One that

@@ -46,8 +46,6 @@ private:
   static void on_added (GstElement *, GObject *socket, gpointer self);
   static void on_removed (
       GstElement *, GObject *socket, int status, gpointer self);
-  static GstPadProbeReturn on_event (
-      GstPad *pad, GstPadProbeInfo *info, gpointer self);
   void end (GstPad *pad);
 
   GstElement *const sink_; // of the pipeline

@@ -117,8 +117,6 @@ Run::prepare ()
     receivers_ = std::make_unique<Receivers> (job_.server);
   if (job_.window)
     watch_window ();
-  for (GstElement *limit : job_.limits)
-    limits_.push_back (std::make_unique<FrameLimit> (limit));
 }
 
 void

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "pipeline/buffer_watch.h"
-#include "pipeline/frame_limit.h"
 #include "pipeline/job.h"
 #include "pipeline/leaky_queue.h"
 #include "pipeline/messages.h"
@@ -81,7 +80,6 @@ private:
   std::vector<BufferWatch> buffer_watches_;
   std::unique_ptr<Receivers> receivers_;
   std::unique_ptr<RecordingBranch> recording_; // beside a window
-  std::vector<std::unique_ptr<FrameLimit>> limits_;
   Exit exit_ = Exit::done;
   Clock::time_point began_ = Clock::now ();
   Clock::time_point heard_ = Clock::now (); // the last new frame

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "source.h"
 
-#include <memory>
 #include <string>
 
 #include "base/text.h"
 #include "common/element.h"
 #include "common/meta.h"
+#include "pipeline/pads.h"
 
 namespace codedexposure::app
 {
@@ -107,9 +107,8 @@ add_camera_settings (Settings &settings, const SourceOptions &options)
  * The first frame, in whose exposure not all slots lie, is an error. It says
  * its exposure itself: asking the camera would hold it up. */
 GstPadProbeReturn
-check_first_frame (GstPad *pad, GstPadProbeInfo *info, gpointer needed)
+check_first_frame (GstPad *pad, GstPadProbeInfo *info, GstClockTime least)
 {
-  const auto least = GstClockTime (*static_cast<Nanoseconds *> (needed));
   const auto meta = get_frame_meta (GST_PAD_PROBE_INFO_BUFFER (info));
   if (!meta || !GST_CLOCK_TIME_IS_VALID (meta->exposure_duration) ||
       meta->exposure_duration > least)
@@ -146,16 +145,12 @@ watch_exposure (GstElement *behind_camera, const SourcePlan &plan)
   const auto slots = SlotPlan::fit (
       plan.schedule.timing (), plan.schedule.slots (), plan.frame_rate);
   if (slots)
-    gst_pad_add_probe (pad_of (behind_camera, "sink").get (),
-        GST_PAD_PROBE_TYPE_BUFFER, check_first_frame,
-        new Nanoseconds (slots->start (slots->slots () - 1)),
-        [] (gpointer needed) { delete static_cast<Nanoseconds *> (needed); });
+    add_probe (pad_of (behind_camera, "sink").get (), GST_PAD_PROBE_TYPE_BUFFER,
+        [least = GstClockTime (slots->start (slots->slots () - 1))] (
+            GstPad *pad, GstPadProbeInfo *info) {
+          return check_first_frame (pad, info, least);
+        });
 }
-
-struct HeldPad {
-  ObjectPtr<GstPad> pad;
-  gulong probe;
-};
 
 /* A camera that waits for its trigger gives up after two seconds, and the masks
  * may take longer to be sent: @p waiting, the element behind it, gets nothing
@@ -163,25 +158,17 @@ struct HeldPad {
 void
 begin_after (GstElement *waiting, GstElement *first)
 {
-  auto held = std::make_unique<HeldPad> (pad_of (waiting, "sink"), 0);
-  held->probe = gst_pad_add_probe (
-      held->pad.get (),
-      GstPadProbeType (
-          GST_PAD_PROBE_TYPE_BLOCK | GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM),
-      [] (GstPad *, GstPadProbeInfo *, gpointer) { return GST_PAD_PROBE_OK; },
-      nullptr, nullptr);
-  gst_pad_add_probe (
-      pad_of (first, "src").get (), GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
-      [] (GstPad *, GstPadProbeInfo *info, gpointer data) {
+  const gulong held = add_probe (pad_of (waiting, "sink").get (),
+      GST_PAD_PROBE_TYPE_BLOCK | GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
+      [] (GstPad *, GstPadProbeInfo *) { return GST_PAD_PROBE_OK; });
+  add_probe (pad_of (first, "src").get (), GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
+      [waiting, held] (GstPad *, GstPadProbeInfo *info) {
         if (GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info)) !=
             GST_EVENT_STREAM_START)
           return GST_PAD_PROBE_OK;
-        const auto *held = static_cast<HeldPad *> (data);
-        gst_pad_remove_probe (held->pad.get (), held->probe);
+        gst_pad_remove_probe (pad_of (waiting, "sink").get (), held);
         return GST_PAD_PROBE_REMOVE;
-      },
-      held.release (),
-      [] (gpointer data) { delete static_cast<HeldPad *> (data); });
+      });
 }
 
 /* The frames of a user's source may already have a schedule and times. */
@@ -357,16 +344,27 @@ coded_pairs (Job &job, const SourceOptions &options, const SourcePlan &plan,
   return on.queue (waiting).to (pair, "on");
 }
 
-/* identity also counts the frame that it refuses; the run ends the stream
- * before that one is made. */
+/* identity ends the stream when it refuses the next frame, which was already
+ * produced and counted; so the stream is ended directly after the last one. */
 void
 limit_frames (Job &job, const SourceOptions &options, Chain &chain)
 {
   if (!options.frames)
     return;
   chain.to ("identity", {{"eos-after", *options.frames + 1}});
-  job.limits.push_back (chain.last ());
   job.total = *options.frames;
+  add_probe (pad_of (chain.last (), "src").get (), GST_PAD_PROBE_TYPE_BUFFER,
+      [left = *options.frames] (GstPad *pad, GstPadProbeInfo *info) mutable {
+        if (--left != 0)
+          return GST_PAD_PROBE_OK;
+        /* The push calls this probe again. */
+        GstBuffer *last = GST_PAD_PROBE_INFO_BUFFER (info);
+        GST_PAD_PROBE_INFO_DATA (info) = nullptr;
+        const GstFlowReturn flow = gst_pad_push (pad, last);
+        GST_PAD_PROBE_INFO_FLOW_RETURN (info) =
+            flow == GST_FLOW_OK ? GST_FLOW_EOS : flow;
+        return GST_PAD_PROBE_HANDLED;
+      });
 }
 
 } // namespace codedexposure::app

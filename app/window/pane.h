@@ -20,7 +20,6 @@ struct ViewTimes {
 ViewTimes view_times_of (GstPad *pad, GstClockTime time);
 
 struct Window::Pane {
-  Window *window;
   std::size_t index;
   WindowPane part;
 

@@ -8,6 +8,7 @@
 
 #include "common/raii.h"
 #include "pipeline/graph.h"
+#include "pipeline/pads.h"
 
 namespace codedexposure::app
 {
@@ -32,15 +33,15 @@ inline void
 wait_for_inputs (GstElement *compositor)
 {
   /* Sticky events that are dropped come again before the next frame. */
-  const auto on_output = [] (GstPad *, GstPadProbeInfo *info, gpointer data) {
-    const bool ends =
-        (info->type & GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM) &&
-        GST_EVENT_TYPE (gst_pad_probe_info_get_event (info)) == GST_EVENT_EOS;
-    return ends || has_all_inputs (GST_ELEMENT (data)) ? GST_PAD_PROBE_REMOVE
-                                                       : GST_PAD_PROBE_DROP;
-  };
-  gst_pad_add_probe (pad_of (compositor, "src").get (),
-      GST_PAD_PROBE_TYPE_DATA_DOWNSTREAM, on_output, compositor, nullptr);
+  add_probe (pad_of (compositor, "src").get (),
+      GST_PAD_PROBE_TYPE_DATA_DOWNSTREAM,
+      [compositor] (GstPad *, GstPadProbeInfo *info) {
+        const bool ends = (info->type & GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM) &&
+                          GST_EVENT_TYPE (gst_pad_probe_info_get_event (
+                              info)) == GST_EVENT_EOS;
+        return ends || has_all_inputs (compositor) ? GST_PAD_PROBE_REMOVE
+                                                   : GST_PAD_PROBE_DROP;
+      });
 }
 
 } // namespace codedexposure::app

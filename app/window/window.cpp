@@ -12,6 +12,7 @@
 #include "common/kept_frame.h"
 #include "common/meta.h"
 #include "pipeline/messages.h"
+#include "pipeline/pads.h"
 #include "window/pane.h"
 #include "window/screen.h"
 #include "window/whole_picture.h"
@@ -41,27 +42,14 @@ caption_of_stream (const char *what, const GstVideoInfo &info)
   return format ("%s%s, %dx%d", what, rate.c_str (), info.width, info.height);
 }
 
-std::optional<GstVideoInfo>
-info_at (GstPad *pad)
-{
-  const CapsPtr caps (gst_pad_get_current_caps (pad));
-  GstVideoInfo info;
-  if (!caps || !gst_video_info_from_caps (&info, caps.get ()))
-    return std::nullopt;
-  return info;
-}
-
 /* Of an event with caps. */
 std::optional<GstVideoInfo>
 info_in (GstPadProbeInfo *probed)
 {
   GstEvent *event = gst_pad_probe_info_get_event (probed);
-  GstCaps *caps = nullptr;
   GstVideoInfo info;
-  if (GST_EVENT_TYPE (event) != GST_EVENT_CAPS)
-    return std::nullopt;
-  gst_event_parse_caps (event, &caps);
-  if (!gst_video_info_from_caps (&info, caps))
+  if (GST_EVENT_TYPE (event) != GST_EVENT_CAPS ||
+      !gst_video_info_from_caps (&info, caps_of (event)))
     return std::nullopt;
   return info;
 }
@@ -77,7 +65,6 @@ Window::Window (WindowBranch branch, GstPad *coded, Style style)
   panel_at_ = pad_of (branch.overlay, "sink");
   for (WindowPane &part : branch.panes) {
     auto pane = std::make_unique<Pane> ();
-    pane->window = this;
     pane->index = panes_.size ();
     pane->part = std::move (part);
     pane->caption = pane->part.caption;
@@ -87,11 +74,15 @@ Window::Window (WindowBranch branch, GstPad *coded, Style style)
     panes_.push_back (std::move (pane));
   }
   wait_for_inputs (branch.compositor);
-  gst_pad_add_probe (coded, GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, on_camera_caps,
-      this, nullptr);
+  /* The layout is set before the caps reach the panes. */
+  add_probe (coded, GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
+      [this] (GstPad *, GstPadProbeInfo *info) {
+        if (const auto camera = info_in (info))
+          set_layout (*camera);
+        return GST_PAD_PROBE_OK;
+      });
   g_signal_connect (branch.overlay, "draw", G_CALLBACK (on_draw), this);
-  gst_pad_add_probe (pad_of (branch.overlay, "src").get (),
-      GST_PAD_PROBE_TYPE_EVENT_UPSTREAM, on_upstream, branch.overlay, nullptr);
+  watch_keys (branch.overlay);
 }
 
 Window::~Window ()
@@ -137,31 +128,18 @@ Window::finish ()
 void
 Window::watch (Pane &pane)
 {
-  const WindowPane &part = pane.part;
-  gst_pad_add_probe (pad_of (part.entry, "sink").get (),
-      GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, on_arriving_caps, &pane, nullptr);
-  gst_pad_add_probe (pad_of (part.entry, "src").get (),
-      GstPadProbeType (
-          GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_BOTH),
-      on_pane_data, &pane, nullptr);
-}
-
-/* The layout is set before the caps reach the panes. */
-GstPadProbeReturn
-Window::on_camera_caps (GstPad *, GstPadProbeInfo *info, gpointer self)
-{
-  if (const auto camera = info_in (info))
-    static_cast<Window *> (self)->set_layout (*camera);
-  return GST_PAD_PROBE_OK;
-}
-
-GstPadProbeReturn
-Window::on_arriving_caps (GstPad *, GstPadProbeInfo *info, gpointer data)
-{
-  const auto &pane = *static_cast<const Pane *> (data);
-  if (const auto picture = info_in (info))
-    pane.window->set_queues (pane, *picture);
-  return GST_PAD_PROBE_OK;
+  add_probe (pad_of (pane.part.entry, "sink").get (),
+      GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
+      [this, &pane] (GstPad *, GstPadProbeInfo *info) {
+        if (const auto picture = info_in (info))
+          set_queues (pane, *picture);
+        return GST_PAD_PROBE_OK;
+      });
+  add_probe (pad_of (pane.part.entry, "src").get (),
+      GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_BOTH,
+      [this, &pane] (GstPad *pad, GstPadProbeInfo *info) {
+        return take_data (pane, pad, info);
+      });
 }
 
 /* The pictures of two coded frames, since those of one come at once, and those
@@ -207,11 +185,10 @@ Window::set_layout (const GstVideoInfo &camera)
 }
 
 GstPadProbeReturn
-Window::on_pane_data (GstPad *pad, GstPadProbeInfo *info, gpointer data)
+Window::take_data (Pane &pane, GstPad *pad, GstPadProbeInfo *info)
 {
-  auto &pane = *static_cast<Pane *> (data);
   if (info->type & GST_PAD_PROBE_TYPE_BUFFER) {
-    pane.window->remember (pane, pad, GST_PAD_PROBE_INFO_BUFFER (info));
+    remember (pane, pad, GST_PAD_PROBE_INFO_BUFFER (info));
     return GST_PAD_PROBE_OK;
   }
   /* New sizes in the window are not for the stream, which would begin anew. */
@@ -219,7 +196,7 @@ Window::on_pane_data (GstPad *pad, GstPadProbeInfo *info, gpointer data)
       GST_EVENT_RECONFIGURE)
     return GST_PAD_PROBE_DROP;
   if (const auto picture = info_in (info))
-    pane.window->set_pane (pane, *picture);
+    set_pane (pane, *picture);
   return GST_PAD_PROBE_OK;
 }
 
@@ -287,7 +264,7 @@ Window::is_kept (const Pane &pane, ViewTime time) const
 void
 Window::remember (Pane &pane, GstPad *pad, GstBuffer *frame)
 {
-  const auto info = info_at (pad);
+  const auto info = video_at (pad);
   const auto [running, stream] = view_times_of (pad, GST_BUFFER_PTS (frame));
   if (!info || !GST_CLOCK_TIME_IS_VALID (running))
     return;

@@ -68,18 +68,12 @@ private:
   };
   using ShownPtr = std::shared_ptr<const Shown>;
   struct Pane;
-  static GstPadProbeReturn on_camera_caps (
-      GstPad *, GstPadProbeInfo *info, gpointer self);
-  static GstPadProbeReturn on_arriving_caps (
-      GstPad *, GstPadProbeInfo *info, gpointer pane);
-  static GstPadProbeReturn on_pane_data (
-      GstPad *pad, GstPadProbeInfo *info, gpointer pane);
-  static GstPadProbeReturn on_upstream (
-      GstPad *, GstPadProbeInfo *info, gpointer overlay);
   static void on_draw (GstElement *overlay, cairo_t *cairo, guint64 time,
       guint64, gpointer self);
 
+  static void watch_keys (GstElement *overlay);
   void watch (Pane &pane);
+  GstPadProbeReturn take_data (Pane &pane, GstPad *pad, GstPadProbeInfo *info);
   void set_layout (const GstVideoInfo &camera);
   void set_queues (const Pane &pane, const GstVideoInfo &picture);
   void set_pane (Pane &pane, const GstVideoInfo &picture);

@@ -5,6 +5,7 @@
 #include "base/pixels.h"
 #include "common/element.h"
 #include "pipeline/messages.h"
+#include "pipeline/pads.h"
 #include "window/pane.h"
 
 namespace codedexposure::app
@@ -37,13 +38,11 @@ struct Window::Scene {
 ViewTimes
 view_times_of (GstPad *pad, GstClockTime time)
 {
-  const EventPtr event (gst_pad_get_sticky_event (pad, GST_EVENT_SEGMENT, 0));
-  const GstSegment *segment = nullptr;
-  if (!event)
+  const auto segment = segment_at (pad);
+  if (!segment)
     return {};
-  gst_event_parse_segment (event.get (), &segment);
-  return {gst_segment_to_running_time (segment, GST_FORMAT_TIME, time),
-      gst_segment_to_stream_time (segment, GST_FORMAT_TIME, time)};
+  return {gst_segment_to_running_time (&*segment, GST_FORMAT_TIME, time),
+      gst_segment_to_stream_time (&*segment, GST_FORMAT_TIME, time)};
 }
 
 void

@@ -9,6 +9,7 @@
 #include "common/messages.h"
 #include "pipeline/cameras.h"
 #include "pipeline/messages.h"
+#include "pipeline/pads.h"
 #include "window/pane.h"
 #include "window/screen.h"
 
@@ -49,15 +50,18 @@ text_of (const EventFound &event)
 
 /* Keys are for the window; no element of the stream needs them. They go by the
  * bus, on which sinks post those that come while the stream is flushed. */
-GstPadProbeReturn
-Window::on_upstream (GstPad *, GstPadProbeInfo *info, gpointer overlay)
+void
+Window::watch_keys (GstElement *overlay)
 {
-  GstEvent *event = gst_pad_probe_info_get_event (info);
-  if (GST_EVENT_TYPE (event) != GST_EVENT_NAVIGATION)
-    return GST_PAD_PROBE_OK;
-  gst_element_post_message (GST_ELEMENT (overlay),
-      gst_navigation_message_new_event (GST_OBJECT (overlay), event));
-  return GST_PAD_PROBE_DROP;
+  add_probe (pad_of (overlay, "src").get (), GST_PAD_PROBE_TYPE_EVENT_UPSTREAM,
+      [overlay] (GstPad *, GstPadProbeInfo *info) {
+        GstEvent *event = gst_pad_probe_info_get_event (info);
+        if (GST_EVENT_TYPE (event) != GST_EVENT_NAVIGATION)
+          return GST_PAD_PROBE_OK;
+        gst_element_post_message (overlay,
+            gst_navigation_message_new_event (GST_OBJECT (overlay), event));
+        return GST_PAD_PROBE_DROP;
+      });
 }
 
 void

@@ -42,6 +42,7 @@ private:
   RunResult play_once (bool salvage, bool &found);
   [[noreturn]] void decode_on_cores () const;
 
+  const Options *declared_ = nullptr;
   std::string recording_;
   DecodeOptions decode_;
   RunOptions run_;
@@ -86,6 +87,7 @@ Decode::text ()
 void
 Decode::declare (Options &options)
 {
+  declared_ = &options;
   options.word ("RECORDING.mkv", recording_);
   options.heading ("");
   options.value ("--output", output_, "OUT", "subframes");
@@ -344,23 +346,10 @@ Decode::decode_on_cores () const
   }
   std::vector<std::string> words{"work", "decode", recording_, *output_,
       std::to_string (*jobs_), run_.force ? "1" : ""};
-  const auto pass = [&words] (const char *name, const std::string &value) {
-    words.push_back (std::string ("--") + name + "=" + value);
-  };
-  const auto decoding = decode_.words ();
-  words.insert (words.end (), decoding.begin (), decoding.end ());
-  if (statistics_)
-    pass ("statistics", *statistics_);
-  if (second_)
-    pass ("second", *second_);
-  if (region_)
-    pass ("region", std::to_string (*region_));
-  if (white_)
-    pass ("white", std::to_string (*white_));
-  if (view_)
-    words.emplace_back ("--view");
-  if (deflate_)
-    words.emplace_back ("--deflate");
+  for (const auto &given :
+      {decode_.words (), declared_->given ({"--statistics", "--second",
+                             "--region", "--white", "--view", "--deflate"})})
+    words.insert (words.end (), given.begin (), given.end ());
   become_archive (words);
 }
 

@@ -123,6 +123,18 @@ Options::value_text (const std::string &name) const
   return app_.get_option (name)->results ().back ();
 }
 
+std::vector<std::string>
+Options::given (std::initializer_list<const char *> names) const
+{
+  std::vector<std::string> words;
+  for (const Declared &option : declared_)
+    if (has (option.name) &&
+        std::ranges::find (names, option.name) != names.end ())
+      words.push_back (
+          option.name + (option.read ? "=" + value_text (option.name) : ""));
+  return words;
+}
+
 void
 Options::check_value (const Declared &option) const
 {

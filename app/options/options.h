@@ -83,6 +83,9 @@ public:
 
   /** Whether the option stands on the command line. */
   bool has (const std::string &name) const;
+  /** Those of @p names that do, as words of another command line. */
+  std::vector<std::string> given (
+      std::initializer_list<const char *> names) const;
 
   /** After the command line was parsed: reads the values and checks the
    * relations. Throws Failure. */

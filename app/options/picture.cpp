@@ -2,7 +2,6 @@
 #include "picture.h"
 
 #include "base/text.h"
-#include "pipeline/graph.h"
 
 namespace codedexposure::app
 {
@@ -29,6 +28,7 @@ void
 DecodeOptions::declare (Options &options)
 {
   const Rule<double> at_least_0 = real (0, 1e9, "a number of at least 0");
+  declared_ = &options;
   declare_method (options, "the recording");
   options.value ("--fuse", fuse, "QUALITY",
       "full-size frames instead of subframes: fast, balanced, best, or learned "
@@ -66,29 +66,9 @@ DecodeOptions::declare (Options &options)
 std::vector<std::string>
 DecodeOptions::words () const
 {
-  std::vector<std::string> words;
-  const auto add = [&words] (const char *name, const std::string &value) {
-    words.push_back (std::string ("--") + name + "=" + value);
-  };
-  const std::pair<const char *, const std::optional<Text> &> texts[] = {
-      {"method", method}, {"mapping", mapping}, {"fuse", fuse},
-      {"bench", bench}, {"schedule", schedule}};
-  for (const auto &[name, value] : texts)
-    if (value)
-      add (name, *value);
-  if (full_well)
-    add ("full-well", property_text (*full_well));
-  if (read_noise)
-    add ("read-noise", property_text (*read_noise));
-  if (range)
-    add ("range", std::to_string (*range));
-  if (overlap)
-    add ("overlap", std::to_string (*overlap));
-  if (bits)
-    add ("bits", std::to_string (*bits));
-  if (refine)
-    words.emplace_back ("--refine");
-  return words;
+  return declared_->given (
+      {"--method", "--mapping", "--fuse", "--refine", "--overlap", "--bench",
+          "--full-well", "--read-noise", "--range", "--schedule", "--bits"});
 }
 
 namespace

@@ -9,7 +9,9 @@
 namespace codedexposure::app
 {
 
-struct DecodeOptions {
+class DecodeOptions
+{
+public:
   std::optional<Text> method, mapping, fuse, bench, schedule;
   std::optional<double> full_well, read_noise;
   std::optional<int> bits, range, overlap;
@@ -20,8 +22,11 @@ struct DecodeOptions {
   void declare_method (Options &options, const std::string &origin);
   void declare_frames (Options &options, const std::string &origin);
 
-  /** Those that are set, as words of another command line. */
+  /** Those that are set, as words of another command line. After declare (). */
   std::vector<std::string> words () const;
+
+private:
+  const Options *declared_ = nullptr;
 };
 
 /** "A-B" in seconds; no B: to the end. */

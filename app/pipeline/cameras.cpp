@@ -8,6 +8,7 @@
 
 #include "base/try.h"
 #include "common/raii.h"
+#include "pipeline/graph.h"
 #include "pipeline/messages.h"
 
 namespace codedexposure::app
@@ -88,9 +89,7 @@ change_number (GstElement *camerasrc, const CameraNumber &number, int steps,
   const auto held = camera_of (camerasrc);
   if (!held)
     return Error{"there is no camera yet"};
-  gchar *bench = nullptr;
-  g_object_get (camerasrc, "bench", &bench, nullptr);
-  if (const gst::CharPtr profile (bench); profile && *profile)
+  if (!text_property (camerasrc, "bench").empty ())
     return Error{"the bench profile was measured at the " +
                  std::string (number.name) +
                  " that the camera has; start without --bench to change it"};

@@ -29,9 +29,9 @@ Graph::~Graph ()
 namespace
 {
 
-/* "demux", or "demux-2" for the second one: only for messages and printed lines,
- * as elements are not found by their names. gst-launch-1.0 would take "queue2"
- * for one that a bin has inside. */
+/* "demux", or "demux-2" for the second one: only for messages and printed
+ * lines, as elements are not found by their names. gst-launch-1.0 would take
+ * "queue2" for one that a bin has inside. */
 std::string
 name_for (GstElement *pipeline, std::string_view factory)
 {
@@ -236,6 +236,15 @@ std::string
 factory_of (GstObject *object)
 {
   return GST_IS_ELEMENT (object) ? factory_of (GST_ELEMENT (object)) : "";
+}
+
+std::string
+text_property (GstElement *element, const std::string &property)
+{
+  gchar *text = nullptr;
+  g_object_get (element, property.c_str (), &text, nullptr);
+  const CharPtr owned (text);
+  return text ? text : "";
 }
 
 } // namespace codedexposure::app

@@ -135,6 +135,8 @@ using gst::pad_of;
 std::string factory_of (GstElement *element);
 /** The same of what may be no element. */
 std::string factory_of (GstObject *object);
+/** A property of @p element that is a text; empty: it is not set. */
+std::string text_property (GstElement *element, const std::string &property);
 
 /** The element to which a pad of @p element is linked when it comes; null:
  * none.

@@ -2,12 +2,14 @@
 #include "guide.h"
 
 #include <string_view>
+#include <utility>
 
 #include <unistd.h>
 
 #include <glib-unix.h>
 
 #include "calibrate/session.h"
+#include "common/messages.h"
 #include "pipeline/messages.h"
 #include "pipeline/status.h"
 
@@ -25,20 +27,17 @@ constexpr int kReadingsPerMove = 8;
 /* Part of the required travel that one move of the simulated stage makes. */
 constexpr double kMovePart = 0.9;
 
-double
-number_of (const GstStructure *structure, const char *field)
-{
-  double value = 0.0;
-  gst_structure_get_double (structure, field, &value);
-  return value;
-}
-
-std::string
-text_of (const GstStructure *structure, const char *field)
-{
-  const gchar *text = gst_structure_get_string (structure, field);
-  return text ? text : "";
-}
+/* What the states of moirecalib mean for a person. */
+constexpr std::pair<std::string_view, const char *> kStates[] = {
+    {"searching", "searching for the grating: focus, and place the camera "
+                  "roughly in front of the mirrors"},
+    {"coarse", "coarse: move the stage as the arrows show, the angle first; "
+               "press Enter to start the mapping now"},
+    {"fine", "fine: no pixel is off by more than one mirror; continue"},
+    {"aligned", "aligned: do not touch the stage"},
+    {"mapping", "showing patterns; do not touch the bench"},
+    {"solving", "solving; the mirrors show the schedule again"},
+};
 
 class Guide
 {
@@ -58,11 +57,11 @@ private:
   }
   void on_element (const GstStructure *structure);
   void on_state (const std::string &state);
-  void on_reading (const GstStructure *reading);
-  void on_mapping (const GstStructure *mapping);
-  void say_mapping (const GstStructure *mapping, const char *camera);
-  void check_files (const GstStructure *mapping, const std::string &prefix);
-  void move_stage (const GstStructure *reading);
+  void on_reading (const MoireReading &reading);
+  void on_mapping (const MoireMapping &mapping);
+  void say_mapping (const MoireMapping &mapping, const char *camera);
+  void check_files (const MoireMapping &mapping, const std::string &prefix);
+  void move_stage (const StageMove &move);
 
   Job &job_;
   GstElement *calib_;
@@ -130,142 +129,110 @@ Guide::is_done ()
 void
 Guide::on_state (const std::string &state)
 {
-  if (state == "searching")
-    status_.line ("searching for the grating: focus, and place the camera "
-                  "roughly in front of the mirrors");
-  else if (state == "coarse")
-    status_.line ("coarse: move the stage as the arrows show, the angle first; "
-                  "press Enter to start the mapping now");
-  else if (state == "fine")
-    status_.line ("fine: no pixel is off by more than one mirror; continue");
-  else if (state == "aligned")
-    status_.line ("aligned: do not touch the stage");
-  else if (state == "mapping")
-    status_.line ("showing patterns; do not touch the bench");
-  else if (state == "solving")
-    status_.line ("solving; the mirrors show the schedule again");
-  else if (state == "failed" && keys_ != 0)
+  for (const auto &[name, meaning] : kStates)
+    if (state == name)
+      status_.line (meaning);
+  if (state == "failed" && keys_ != 0)
     status_.line ("the mapping failed; correct the bench and press Enter to "
                   "try again");
   else if (state == "failed")
     end ();
 }
 
-std::string
-arrow (double way, const char *forth, const char *back)
-{
-  return way >= 0 ? forth : back;
-}
-
 void
-Guide::on_reading (const GstStructure *reading)
+Guide::on_reading (const MoireReading &reading)
 {
-  const double x = number_of (reading, "stage-x");
-  const double y = number_of (reading, "stage-y");
-  const double theta = number_of (reading, "stage-theta");
-  const double magnify = number_of (reading, "magnify");
+  const StageMove &move = reading.move;
+  const char *state = reading.state.c_str ();
   status_.progress (format (
       "%s  %s %+.2f µm  %s %+.2f µm  %s %+.1f mdeg  magnify %+.2f per mille  "
       "(worst corner %.3f mirrors)",
-      text_of (reading, "state").c_str (), arrow (x, "→", "←").c_str (), x,
-      arrow (y, "↓", "↑").c_str (), y, arrow (theta, "↻", "↺").c_str (), theta,
-      magnify, number_of (reading, "deviation")));
+      state, move.stage_x >= 0 ? "→" : "←", move.stage_x,
+      move.stage_y >= 0 ? "↓" : "↑", move.stage_y,
+      move.stage_theta >= 0 ? "↻" : "↺", move.stage_theta, move.magnify,
+      move.deviation));
   last_reading_ = format (
       "%s: rotation %+.5f deg, magnification %.6f, offset %+.5f, %+.5f mirrors "
       "(worst corner %.3f)",
-      text_of (reading, "state").c_str (), number_of (reading, "rotation"),
-      number_of (reading, "magnification"), number_of (reading, "offset-x"),
-      number_of (reading, "offset-y"), number_of (reading, "deviation"));
-  if (stage_ && ++readings_ % kReadingsPerMove == 0)
-    move_stage (reading);
+      state, move.rotation, move.magnification, move.offset_x, move.offset_y,
+      move.deviation);
+  if (stage_ && ++readings_ % kReadingsPerMove == 0 &&
+      reading.state != "aligned")
+    move_stage (move);
 }
 
 /* Moves the simulated bench as a person would move the stage. */
 void
-Guide::move_stage (const GstStructure *reading)
+Guide::move_stage (const StageMove &move)
 {
-  if (text_of (reading, "state") == "aligned")
-    return;
   GObject *stage = G_OBJECT (stage_);
   double x = 0, y = 0, rotation = 0, scale = 1;
   g_object_get (stage, "shift-x", &x, "shift-y", &y, "rotation", &rotation,
       "scale", &scale, nullptr);
-  const double magnify = number_of (reading, "magnify") / 1000.0;
-  g_object_set (stage, "shift-x",
-      x - kMovePart * number_of (reading, "offset-x"), "shift-y",
-      y - kMovePart * number_of (reading, "offset-y"), "rotation",
-      rotation - kMovePart * number_of (reading, "rotation"), "scale",
-      scale * (1.0 + kMovePart * magnify), nullptr);
+  g_object_set (stage, "shift-x", x - kMovePart * move.offset_x, "shift-y",
+      y - kMovePart * move.offset_y, "rotation",
+      rotation - kMovePart * move.rotation, "scale",
+      scale * (1.0 + kMovePart * (move.magnify / 1000.0)), nullptr);
 }
 
 /* @camera: "" or "second camera, ". */
 void
-Guide::say_mapping (const GstStructure *mapping, const char *camera)
+Guide::say_mapping (const MoireMapping &mapping, const char *camera)
 {
-  guint64 good = 0, uncovered = 0, saturated = 0;
-  gst_structure_get (mapping, "good", G_TYPE_UINT64, &good, "uncovered",
-      G_TYPE_UINT64, &uncovered, "saturated", G_TYPE_UINT64, &saturated,
-      nullptr);
+  const StageMove &move = mapping.move;
   status_.line (
       camera + format ("mapped: rotation %+.5f ± %.0e deg, magnification "
                        "%.6f ± %.0e, offset %+.5f, %+.5f ± %.0e mirrors",
-                   number_of (mapping, "rotation"),
-                   number_of (mapping, "sigma-rotation"),
-                   number_of (mapping, "magnification"),
-                   number_of (mapping, "sigma-magnification"),
-                   number_of (mapping, "offset-x"),
-                   number_of (mapping, "offset-y"),
-                   number_of (mapping, "sigma-x")));
+                   move.rotation, move.sigma_rotation, move.magnification,
+                   move.sigma_magnification, move.offset_x, move.offset_y,
+                   move.sigma_x));
   status_.line (
       camera + format ("pixels: %" G_GUINT64_FORMAT " good, %" G_GUINT64_FORMAT
                        " see no mirror, %" G_GUINT64_FORMAT " saturated",
-                   good, uncovered, saturated));
+                   mapping.good, mapping.uncovered, mapping.saturated));
 }
 
 /* @prefix: of the properties that name them. */
 void
-Guide::check_files (const GstStructure *mapping, const std::string &prefix)
+Guide::check_files (const MoireMapping &mapping, const std::string &prefix)
 {
-  for (const char *file : {"location", "report"}) {
-    gchar *asked = nullptr;
-    g_object_get (calib_, (prefix + file).c_str (), &asked, nullptr);
-    const bool is_written = mapping && !text_of (mapping, file).empty ();
-    unwritten_ |= !is_written && asked && *asked;
-    g_free (asked);
-  }
+  for (const auto &[property, written] :
+      {std::pair ("location", mapping.location),
+          std::pair ("report", mapping.report)})
+    unwritten_ |=
+        written.empty () && !text_property (calib_, prefix + property).empty ();
 }
 
 /* That of a second camera comes before it. */
 void
-Guide::on_mapping (const GstStructure *mapping)
+Guide::on_mapping (const MoireMapping &mapping)
 {
   mapped_ = true;
   say_mapping (mapping, "");
   double tolerance = 0;
   g_object_get (calib_, "tolerance", &tolerance, nullptr);
   StageCorrection remaining;
-  remaining.deviation = number_of (mapping, "deviation");
+  remaining.deviation = mapping.move.deviation;
   status_.line (alignment_verdict (remaining, tolerance));
   check_files (mapping, "");
   if (!second_mapped_)
-    check_files (nullptr, "second-");
+    check_files ({}, "second-");
   end ();
 }
 
 void
 Guide::on_element (const GstStructure *structure)
 {
-  const std::string_view name = gst_structure_get_name (structure);
-  if (name == "moirecalib/state")
-    on_state (text_of (structure, "state"));
-  else if (name == "moirecalib/reading")
-    on_reading (structure);
-  else if (name == "moirecalib/second-mapping") {
+  if (const auto now = from_structure<MoireState> (structure))
+    on_state (now->state);
+  else if (const auto reading = from_structure<MoireReading> (structure))
+    on_reading (*reading);
+  else if (const auto second = from_structure<MoireSecondMapping> (structure)) {
     second_mapped_ = true;
-    say_mapping (structure, "second camera, ");
-    check_files (structure, "second-");
-  } else if (name == "moirecalib/mapping")
-    on_mapping (structure);
+    say_mapping (second->of, "second camera, ");
+    check_files (second->of, "second-");
+  } else if (const auto mapping = from_structure<MoireMapping> (structure))
+    on_mapping (*mapping);
 }
 
 /* A signal ends an alignment well. */

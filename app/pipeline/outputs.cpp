@@ -25,15 +25,6 @@ namespace fs = std::filesystem;
 namespace
 {
 
-std::string
-text_property (GstElement *element, const char *property)
-{
-  gchar *text = nullptr;
-  g_object_get (element, property, &text, nullptr);
-  const CharPtr owned (text);
-  return text ? text : "";
-}
-
 class File : public Output
 {
 public:

@@ -56,11 +56,8 @@ info_in (GstPadProbeInfo *probed)
 
 } // namespace
 
-Window::Window (WindowBranch branch, GstPad *coded, Style style)
-    : size_ (branch.size), room_ (style.room), delay_ (style.delay),
-      name_ (style.name), title_ (style.title),
-      player_ (std::move (style.player)), camera_source_ (style.camera),
-      exposures_ (style.exposures), keeper_ (style.keeper)
+Window::Window (WindowBranch branch, GstPad *coded, Setup setup)
+    : size_ (branch.size), setup_ (std::move (setup))
 {
   panel_at_ = pad_of (branch.overlay, "sink");
   for (WindowPane &part : branch.panes) {
@@ -97,8 +94,8 @@ Window::begin (Calls calls)
 {
   calls_ = std::move (calls);
   snapshots_.begin (calls_.said);
-  if (player_)
-    return player_->begin (calls_.pipeline, calls_.said);
+  if (setup_.player)
+    return setup_.player->begin (calls_.pipeline, calls_.said);
   on_signal_ = g_unix_signal_add (
       SIGUSR1,
       [] (gpointer self) {
@@ -118,11 +115,11 @@ Window::finish ()
         gst_bus_pop_filtered (bus.get (),
             GstMessageType (GST_MESSAGE_ELEMENT | GST_MESSAGE_WARNING)));
   };
-  for (auto message = next (); keeper_ && message; message = next ())
+  for (auto message = next (); setup_.keeper && message; message = next ())
     take_kept (message.get ());
   snapshots_.write ();
-  if (player_)
-    player_->finish ();
+  if (setup_.player)
+    setup_.player->finish ();
 }
 
 void
@@ -158,7 +155,7 @@ Window::set_queues (const Pane &pane, const GstVideoInfo &picture)
   }
   if (rate <= 0 || camera <= 0)
     return;
-  const double waiting = 2 * rate * (1 / camera + 1e-9 * double (delay_));
+  const double waiting = 2 * rate * (1 / camera + 1e-9 * double (setup_.delay));
   const int most = std::max (kFewest, int (std::ceil (waiting - 1e-6)));
   for (GstElement *queue : {pane.part.entry, pane.part.late})
     g_object_set (queue, "max-size-buffers", guint (most), nullptr);
@@ -168,7 +165,7 @@ void
 Window::set_layout (const GstVideoInfo &camera)
 {
   const WindowLayout layout = WindowLayout::fit (
-      {camera.width, camera.height}, int (panes_.size ()), room_);
+      {camera.width, camera.height}, int (panes_.size ()), setup_.room);
   for (const auto &pane : panes_)
     g_object_set (pane->part.mixed.get (), "xpos",
         layout.left (int (pane->index)), "ypos", WindowLayout::kCaption,
@@ -313,7 +310,7 @@ add_window (Job &job, const std::vector<Chain> &sources,
   job.has_window = true;
   job.window = std::make_unique<Window> (std::move (branch),
       pad_of (job.counted, "sink").get (),
-      Window::Style{find_screen ().room (), job.times.shift_to.value_or (0),
+      Window::Setup{find_screen ().room (), job.times.shift_to.value_or (0),
           job.command, job.command + ": " + job.source, job.keeper, job.camera,
           job.exposures,
           played ? std::make_unique<Player> (*std::move (played)) : nullptr});

@@ -34,7 +34,7 @@ namespace codedexposure::app
 class Window : public Viewer
 {
 public:
-  struct Style {
+  struct Setup {
     Extent room;                  ///< for the window, in pixels
     GstClockTime delay = 0;       ///< after which frames are shown
     std::string name;             ///< of the command, in the names of snapshots
@@ -48,7 +48,7 @@ public:
   };
 
   /** @p coded  pad whose caps are those of the coded frames. */
-  Window (WindowBranch branch, GstPad *coded, Style style);
+  Window (WindowBranch branch, GstPad *coded, Setup setup);
   ~Window () override;
   Window (const Window &) = delete;
   Window &operator= (const Window &) = delete;
@@ -109,15 +109,9 @@ private:
   void take_snapshot (cairo_t *cairo, const Scene &scene);
 
   GstElement *const size_; // of the pipeline
-  const Extent room_;
-  const GstClockTime delay_;
-  const std::string name_, title_;
+  const Setup setup_;
   Calls calls_; // constant while the pipeline plays
   std::vector<std::unique_ptr<Pane>> panes_; // constant
-  const std::unique_ptr<Player> player_;
-  GstElement *const camera_source_;
-  const Between exposures_;
-  GstElement *const keeper_; // null: nothing remembers frames
   Snapshots snapshots_;
   gst::ObjectPtr<GstPad> panel_at_; // where it is drawn
   guint on_signal_ = 0;             // source

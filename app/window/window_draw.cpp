@@ -54,7 +54,7 @@ Window::on_draw (
   if (!std::exchange (window->has_title_, true))
     gst_pad_push_event (pad_of (overlay, "src").get (),
         gst_event_new_tag (gst_tag_list_new (
-            GST_TAG_TITLE, window->title_.c_str (), nullptr)));
+            GST_TAG_TITLE, window->setup_.title.c_str (), nullptr)));
   /* A seek begins another segment, whose times do not count from 0. */
   window->draw (cairo, view_times_of (window->panel_at_.get (), time).running);
 }
@@ -70,7 +70,7 @@ bool
 Window::is_wanted (const Shown &subframe) const
 {
   return subframe.meta && GST_CLOCK_TIME_IS_VALID (subframe.stream_time) &&
-         player_->is_wanted (Nanoseconds (subframe.stream_time),
+         setup_.player->is_wanted (Nanoseconds (subframe.stream_time),
              std::max (subframe.meta->subframe, 0));
 }
 
@@ -122,7 +122,7 @@ Window::scene_at (ViewTime time)
   const Shown *subframe = scene.shown[kSubframes].get ();
   scene.snapshot = snapshot_wanted_ && subframe && coded &&
                    (!scene.live || is_pair (*subframe, *coded)) &&
-                   (!player_ || is_wanted (*subframe));
+                   (!setup_.player || is_wanted (*subframe));
   snapshot_wanted_ &= !scene.snapshot;
   scene.text = lines (subframe, coded, time);
   return scene;
@@ -156,8 +156,8 @@ Window::draw (cairo_t *cairo, ViewTime time)
     take_snapshot (cairo, scene);
   if (scene.helps) {
     if (!help_)
-      help_ = paint_sheet (
-          player_ ? Player::keys_of () : WindowOptions::keys_of (name_),
+      help_ = paint_sheet (setup_.player ? Player::keys_of ()
+                                         : WindowOptions::keys_of (setup_.name),
           {scene.layout.size ().width, scene.layout.pane.height});
     paint_over (cairo, help_.get ());
   }
@@ -169,12 +169,12 @@ Window::draw_texts (cairo_t *cairo, const Scene &scene, ViewTime time)
   const Shown *coded = scene.shown[kCamera].get ();
   const Shown *subframe = scene.shown[kSubframes].get ();
   const bool other = painted_subframe_ != subframe;
-  const bool paused = player_ && player_->is_paused ();
+  const bool paused = setup_.player && setup_.player->is_paused ();
   if (!panel_ || scene.snapshot || (!scene.live && other) || paused ||
       time < painted_ || time >= painted_ + kPanelPeriod) {
     panel_ = paint_panel (scene.layout, scene.text,
         coded ? coded->exposure.get () : nullptr,
-        player_ ? Player::short_keys () : kKeys);
+        setup_.player ? Player::short_keys () : kKeys);
     if (!captions_ || written_ != scene.captions)
       captions_ = paint_captions (scene.layout, scene.captions);
     written_ = scene.captions;
@@ -205,9 +205,9 @@ std::vector<PanelLine>
 Window::lines (const Shown *subframe, const Shown *coded, ViewTime time) const
 {
   std::vector<PanelLine> lines;
-  if (player_)
-    lines.push_back (
-        {player_->line (subframe ? Nanoseconds (subframe->stream_time) : 0)});
+  if (setup_.player)
+    lines.push_back ({setup_.player->line (
+        subframe ? Nanoseconds (subframe->stream_time) : 0)});
   else if (replay_.is_live ())
     lines.push_back ({"live"});
   else {
@@ -250,7 +250,7 @@ void
 Window::take_snapshot (cairo_t *cairo, const Scene &scene)
 {
   const Shown &subframe = *scene.shown[kSubframes];
-  std::string name = name_;
+  std::string name = setup_.name;
   if (subframe.meta)
     name += format ("-frame%06" G_GUINT64_FORMAT "-slot%d",
         subframe.meta->frame, std::max (subframe.meta->subframe, 0));

@@ -67,8 +67,8 @@ Window::watch_keys (GstElement *overlay)
 void
 Window::keep ()
 {
-  if (keeper_)
-    g_object_set (keeper_, "keep", TRUE, nullptr);
+  if (setup_.keeper)
+    g_object_set (setup_.keeper, "keep", TRUE, nullptr);
 }
 
 /* Whether the message is about what is kept. */
@@ -79,7 +79,7 @@ Window::take_kept (GstMessage *message)
     keep ();
     return true;
   }
-  if (GST_MESSAGE_SRC (message) != GST_OBJECT (keeper_))
+  if (GST_MESSAGE_SRC (message) != GST_OBJECT (setup_.keeper))
     return false;
   if (const auto kept = parse_message<Kept> (message))
     calls_.said (format ("%s (%" G_GUINT64_FORMAT " coded frames, %.2f s)",
@@ -99,20 +99,20 @@ bool
 Window::take (GstMessage *message)
 {
   GstEvent *parsed = nullptr;
-  if (keeper_ && take_kept (message))
+  if (setup_.keeper && take_kept (message))
     return true;
   if (gst_navigation_message_get_type (message) !=
           GST_NAVIGATION_MESSAGE_EVENT ||
       !gst_navigation_message_parse_event (message, &parsed))
-    return player_ && player_->take (message);
+    return setup_.player && setup_.player->take (message);
   const EventPtr event (parsed);
   const gchar *key = nullptr;
   if (gst_navigation_event_get_type (parsed) ==
       GST_NAVIGATION_EVENT_KEY_PRESS) {
     if (gst_navigation_event_parse_key_event (parsed, &key) && key)
       press (key);
-  } else if (take_mouse (parsed) && player_)
-    player_->redraw ();
+  } else if (take_mouse (parsed) && setup_.player)
+    setup_.player->redraw ();
   return true;
 }
 
@@ -199,12 +199,12 @@ Window::press (const std::string &key)
     return;
   }
   if (press_look (key)) {
-    if (player_)
-      player_->redraw ();
+    if (setup_.player)
+      setup_.player->redraw ();
     return;
   }
-  if (player_)
-    player_->press (key);
+  if (setup_.player)
+    setup_.player->press (key);
   else if (is_key (key, {"k"}))
     keep ();
   else if (is_key (
@@ -298,12 +298,13 @@ Window::stretch_tones ()
 void
 Window::turn_camera (const std::string &key)
 {
-  if (!camera_source_)
+  if (!setup_.camera)
     return;
   const int steps = is_key (key, {"Up", "Prior", "Page_Up"}) ? 1 : -1;
-  const auto turned = is_key (key, {"Up", "Down"})
-                          ? change_gain (camera_source_, steps)
-                          : change_exposure (camera_source_, steps, exposures_);
+  const auto turned =
+      is_key (key, {"Up", "Down"})
+          ? change_gain (setup_.camera, steps)
+          : change_exposure (setup_.camera, steps, setup_.exposures);
   if (turned)
     calls_.told (*turned);
   else

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure report: a page with pictures and figures of a recording. */
+#include <algorithm>
 #include <cinttypes>
 #include <cmath>
 
@@ -28,16 +29,13 @@ namespace
 Rule<Text>
 line_rule ()
 {
-  return {[] (const std::string &text) -> std::optional<Text> {
-            const auto count = [&] (char c) {
-              return std::count (text.begin (), text.end (), c);
-            };
-            const bool is_free = count ('/') > 0;
-            if (!ProfileLine::parse (text) || count ('%') != (is_free ? 4 : 1))
-              return std::nullopt;
-            return text;
-          },
-      "row:50%, column:50% or 10%/20%/90%/80%, in percent"};
+  return text_that (
+      [] (const std::string &text) {
+        const bool is_free = std::ranges::count (text, '/') > 0;
+        return ProfileLine::parse (text) &&
+               std::ranges::count (text, '%') == (is_free ? 4 : 1);
+      },
+      "row:50%, column:50% or 10%/20%/90%/80%, in percent");
 }
 
 class Report

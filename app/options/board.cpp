@@ -46,10 +46,9 @@ Printing::say (const std::string &line) const
 Rule<Text>
 time_rule ()
 {
-  return {[] (const std::string &text) -> std::optional<Text> {
-            return parse_time (text) ? std::optional (text) : std::nullopt;
-          },
-      "a time such as 500us or 10s"};
+  return text_that (
+      [] (const std::string &text) { return bool (parse_time (text)); },
+      "a time such as 500us or 10s");
 }
 
 void

@@ -87,16 +87,15 @@ time_of (std::string_view text)
 Rule<Text>
 excerpt_rule ()
 {
-  return {[] (const std::string &text) -> std::optional<Text> {
-            const auto parts = split (text, '-');
-            if (parts.size () != 2 || !time_of (parts[0]) ||
-                (!parts[1].empty () &&
-                    (!time_of (parts[1]) ||
-                        *time_of (parts[1]) <= *time_of (parts[0]))))
-              return std::nullopt;
-            return text;
-          },
-      "FROM-UNTIL in seconds, UNTIL after FROM, such as 10-20 or 10-"};
+  return text_that (
+      [] (const std::string &text) {
+        const auto parts = split (text, '-');
+        if (parts.size () != 2 || !time_of (parts[0]))
+          return false;
+        const auto until = time_of (parts[1]);
+        return parts[1].empty () || (until && *until > *time_of (parts[0]));
+      },
+      "FROM-UNTIL in seconds, UNTIL after FROM, such as 10-20 or 10-");
 }
 
 std::pair<double, std::optional<double>>

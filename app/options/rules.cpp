@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/text.h"
@@ -46,38 +47,42 @@ list_of (const std::vector<std::string> &words)
 } // namespace
 
 Rule<Text>
+text_that (
+    std::function<bool (const std::string &text)> holds, std::string must_be)
+{
+  return {[holds = std::move (holds)] (const std::string &text) {
+            return holds (text) ? std::optional (text) : std::nullopt;
+          },
+      std::move (must_be)};
+}
+
+Rule<Text>
 any_text ()
 {
-  return {[] (const std::string &text) -> std::optional<Text> {
-            return text.empty () ? std::nullopt : std::optional (text);
-          },
-      "a text that is not empty"};
+  return text_that ([] (const std::string &text) { return !text.empty (); },
+      "a text that is not empty");
 }
 
 Rule<Text>
 one_of (std::initializer_list<const char *> words)
 {
-  std::vector<std::string> known (words.begin (), words.end ());
-  const std::string list = list_of (known);
-  return {[known = std::move (known)] (
-              const std::string &text) -> std::optional<Text> {
-            return std::ranges::find (known, text) == known.end ()
-                       ? std::nullopt
-                       : std::optional (text);
-          },
-      list};
+  const std::vector<std::string> known (words.begin (), words.end ());
+  return text_that (
+      [known] (const std::string &text) {
+        return std::ranges::find (known, text) != known.end ();
+      },
+      list_of (known));
 }
 
 Rule<Text>
 file_ending_in (const char *ending)
 {
   const std::string end = ending;
-  return {[end] (const std::string &text) -> std::optional<Text> {
-            return text.size () > end.size () && text.ends_with (end)
-                       ? std::optional (text)
-                       : std::nullopt;
-          },
-      "a file name that ends in " + end};
+  return text_that (
+      [end] (const std::string &text) {
+        return text.size () > end.size () && text.ends_with (end);
+      },
+      "a file name that ends in " + end);
 }
 
 Rule<int>

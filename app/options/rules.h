@@ -23,6 +23,9 @@ struct Rule {
 
 using Text = std::string;
 
+/** Any text for which @p holds is true. */
+Rule<Text> text_that (
+    std::function<bool (const std::string &text)> holds, std::string must_be);
 /** Any text that is not empty. */
 Rule<Text> any_text ();
 /** One of these words. */

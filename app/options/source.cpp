@@ -76,13 +76,12 @@ SourceOptions::declare_bench (Options &options, Kind kind)
                  "recordings carry it, and other options win");
   options.value ("--seed", seed, "N",
       examined ? "seed of the simulated bench [1]" : "seed of the noise [0]",
-      Rule<Text>{[] (const std::string &text) -> std::optional<Text> {
-                   const bool digits =
-                       !text.empty () && text.size () < 20 &&
-                       text.find_first_not_of ("0123456789") == text.npos;
-                   return digits ? std::optional (text) : std::nullopt;
-                 },
-          "a whole number"});
+      text_that (
+          [] (const std::string &text) {
+            return !text.empty () && text.size () < 20 &&
+                   text.find_first_not_of ("0123456789") == text.npos;
+          },
+          "a whole number"));
   if (examined) {
     options.exclude ({"--bench", "--seed"}, "--camera");
     return;

@@ -64,11 +64,9 @@ constexpr double kRemembered = 10; // s
 Rule<Text>
 event_rule ()
 {
-  return {[] (const std::string &text) {
-            return parse_event_rule (text) ? std::optional<Text> (text)
-                                           : std::nullopt;
-          },
-      "an event such as mean:10 or motion:2@64x48+100+80"};
+  return text_that (
+      [] (const std::string &text) { return bool (parse_event_rule (text)); },
+      "an event such as mean:10 or motion:2@64x48+100+80");
 }
 
 bool

@@ -9,6 +9,7 @@
 #include "base/try.h"
 #include "command.h"
 #include "options/board.h"
+#include "pipeline/messages.h"
 #include "setup/bench_profile.h"
 
 namespace codedexposure::app
@@ -154,21 +155,19 @@ print_table (const std::vector<Finding> &findings)
 std::string
 reason (const Prediction *best, const Arguments &arguments)
 {
-  char text[200];
   if (!best)
-    std::snprintf (text, sizeof text,
+    return format (
         "none of these reaches %g frames/s without overexposure; use a lower "
         "--min-rate or less light",
         arguments.min_rate);
-  else if (!best->schedule)
-    std::snprintf (text, sizeof text,
-        "recommended: no masks; at %g pixels/s the camera is fast enough",
-        arguments.conditions.scene.speed);
-  else
-    std::snprintf (text, sizeof text,
-        "recommended: %s; it has the highest PSNR for a scene of %g pixels/s",
-        best->text ().c_str (), arguments.conditions.scene.speed);
-  return text;
+  const double speed = arguments.conditions.scene.speed;
+  if (!best->schedule)
+    return format ("recommended: no masks; at %g pixels/s the camera is fast "
+                   "enough",
+        speed);
+  return format (
+      "recommended: %s; it has the highest PSNR for a scene of %g pixels/s",
+      best->text ().c_str (), speed);
 }
 
 Exit
@@ -219,7 +218,7 @@ advise (Arguments arguments)
   std::vector<Finding> findings{{none.text (), none}};
   for (const Schedule &schedule : schedules) {
     if (stop.stop_requested ())
-      throw Failure{Exit::interrupted, Error{"interrupted"}};
+      fail ("interrupted", Exit::interrupted);
     findings.push_back (
         {schedule.text (), predict_on (board, schedule, conditions)});
   }

@@ -10,6 +10,7 @@
 #include "common/raii.h"
 #include "options/board.h"
 #include "pipeline/cameras.h"
+#include "pipeline/messages.h"
 
 namespace codedexposure::app
 {
@@ -74,15 +75,6 @@ text_of (ArvCamera *camera, const char *feature)
   return value && *value ? *value : "";
 }
 
-std::string
-in_a_row (const std::vector<std::string> &names)
-{
-  std::string text;
-  for (const std::string &name : names)
-    text += (text.empty () ? "" : ", ") + name;
-  return text;
-}
-
 using ReadNames = const char **(*)(ArvCamera *, guint *, GError **);
 
 std::vector<std::string>
@@ -134,7 +126,7 @@ trigger_of (ArvCamera *camera)
   for (const std::string &source : sources)
     if (source.starts_with ("Line"))
       lines.push_back (source);
-  return lines.empty () ? "by no line" : "by " + in_a_row (lines);
+  return lines.empty () ? "by no line" : "by " + joined (lines);
 }
 
 /* Rows of a rolling shutter are exposed one after the other, through other
@@ -176,7 +168,7 @@ void
 add_abilities (Json &entry, ArvCamera *camera)
 {
   entry["sensor"] = size_of (camera);
-  entry["pixel-formats"] = in_a_row (grey_formats (camera));
+  entry["pixel-formats"] = joined (grey_formats (camera));
   entry["trigger"] = trigger_of (camera);
   entry["shutter"] = shutter_of (camera);
 }
@@ -216,9 +208,7 @@ list (const Arguments &arguments)
 std::string
 number_text (double value)
 {
-  char text[32];
-  std::snprintf (text, sizeof text, "%.10g", value);
-  return text;
+  return format ("%.10g", value);
 }
 
 using ReadBounds = void (*) (ArvCamera *, double *, double *, GError **);

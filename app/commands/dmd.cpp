@@ -15,6 +15,7 @@
 #include "dmd/stop_guard.h"
 #include "dmd/usb_bus.h"
 #include "options/board.h"
+#include "pipeline/messages.h"
 #include "pipeline/plugin.h"
 
 namespace codedexposure::app
@@ -36,9 +37,7 @@ struct Arguments : Printing, BoardOptions {
 std::string
 seconds_text (double seconds)
 {
-  char text[32];
-  std::snprintf (text, sizeof text, "%.1f s", seconds);
-  return text;
+  return format ("%.1f s", seconds);
 }
 
 /** Shows the progress of an upload and the remaining time. */
@@ -54,8 +53,7 @@ public:
   {
     if (!shown_)
       return;
-    const double spent =
-        std::chrono::duration<double> (Clock::now () - start_).count ();
+    const double spent = seconds_since (start_);
     const double part = total > 0 ? double (sent) / total : 1.0;
     std::fprintf (stderr, "\ruploading %3.0f %%", 100 * part);
     if (sent > 0 && sent < total)

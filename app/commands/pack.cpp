@@ -140,9 +140,7 @@ Pack::check_names (const std::string &recording, const std::string &output)
 void
 Pack::check_extras (const std::vector<std::string> &extras)
 {
-  std::string all;
-  for (const std::string &extra : extras)
-    all += (all.empty () ? "" : ", ") + extra;
+  const std::string all = joined (extras);
   if (all.empty ())
     return;
   if (!output_)

@@ -118,7 +118,7 @@ write_bitmaps (const Arguments &arguments, const Schedule &schedule,
   check_unused (arguments, files);
   for (int picture = 0; picture < count; picture++) {
     if (stop.stop_requested ())
-      throw Failure{Exit::interrupted, Error{"interrupted"}};
+      fail ("interrupted", Exit::interrupted);
     const Bytes bytes = arguments.planes
                             ? encode_plane_bitmap (renderer.render<PlanePixel> (
                                   plan.of_image (picture)))
@@ -146,7 +146,7 @@ write_alp (const Arguments &arguments, const DmdInfo &info,
   Bytes planes;
   for (int mask = 0; mask < sequence.pictures; mask++) {
     if (stop.stop_requested ())
-      throw Failure{Exit::interrupted, Error{"interrupted"}};
+      fail ("interrupted", Exit::interrupted);
     append_bit_plane (planes, renderer.render (mask));
   }
   write (files[0], text_of (planes));

@@ -38,8 +38,6 @@ remove_pictures (const fs::path &folder)
       fs::remove (entry.path (), ignored);
 }
 
-} // namespace
-
 void
 check_folder (const std::string &folder, bool replace)
 {
@@ -52,6 +50,8 @@ check_folder (const std::string &folder, bool replace)
     fail (folder + " is not empty; choose another folder, or set --force to "
                    "replace what an earlier run has written");
 }
+
+} // namespace
 
 PageFolder::PageFolder (const std::string &name, bool replace)
     : name_ (without_slash (name)), part_ (name_, Part::kFolder)
@@ -87,8 +87,7 @@ PageFolder::publish ()
   fs::create_directories (to, error);
   // A signal may end this program at any moment: all files get their names at
   // once, or those of an earlier page are replaced and the page comes last.
-  if (fs::is_empty (to, error) &&
-      std::rename (from.c_str (), to.c_str ()) == 0)
+  if (fs::is_empty (to, error) && std::rename (from.c_str (), to.c_str ()) == 0)
     return;
   for (auto entry = fs::recursive_directory_iterator (from, error);
        !error && entry != fs::recursive_directory_iterator (); ++entry) {

@@ -9,10 +9,6 @@
 namespace codedexposure::app
 {
 
-/** Throws Failure if @p folder is none, or has content that must not be
- * replaced. */
-void check_folder (const std::string &folder, bool replace);
-
 /** A folder that is written beside its name, and removed unless it is
  * published. Functions throw Failure. */
 class PageFolder

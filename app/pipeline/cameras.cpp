@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <vector>
 
 #include <arv.h>
 
@@ -14,22 +15,14 @@
 namespace codedexposure::app
 {
 
-std::vector<std::string>
-camera_names ()
-{
-  std::vector<std::string> names;
-  arv_update_device_list ();
-  for (guint i = 0; i < arv_get_n_devices (); i++)
-    names.emplace_back (arv_get_device_id (i));
-  return names;
-}
-
 std::string
 cameras_found ()
 {
-  std::string names;
-  for (const std::string &name : camera_names ())
-    names += (names.empty () ? "" : ", ") + name;
+  std::vector<std::string> found;
+  arv_update_device_list ();
+  for (guint i = 0; i < arv_get_n_devices (); i++)
+    found.emplace_back (arv_get_device_id (i));
+  const std::string names = joined (found);
   return names.empty () ? "no camera was found; check its power and its network"
                         : "the cameras that were found are " + names +
                               "; set --camera to one of them";

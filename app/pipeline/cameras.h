@@ -3,7 +3,6 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
 #include <gst/gst.h>
 
@@ -12,10 +11,7 @@
 namespace codedexposure::app
 {
 
-/** The names of all cameras that answer. Takes a second. */
-std::vector<std::string> camera_names ();
-
-/** The same for a message: which there are, or that there is none. */
+/** Which cameras answer, or that none does, for a message. Takes a second. */
 std::string cameras_found ();
 
 /** Both are included. */

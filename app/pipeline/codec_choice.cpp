@@ -28,12 +28,6 @@ namespace
  * and brighter scenes need time as well. */
 constexpr double kMargin = 1.5;
 
-double
-seconds_since (Clock::time_point begin)
-{
-  return std::chrono::duration<double> (Clock::now () - begin).count ();
-}
-
 /* Frames/s of noise, which takes longest, through the encoder. */
 double
 ffv1_speed (const SourcePlan &plan)

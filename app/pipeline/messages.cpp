@@ -163,6 +163,22 @@ format (const char *pattern, ...)
 }
 
 std::string
+joined (const std::vector<std::string> &texts)
+{
+  std::string all;
+  for (const std::string &text : texts)
+    all += (all.empty () ? "" : ", ") + text;
+  return all;
+}
+
+double
+seconds_since (std::chrono::steady_clock::time_point begin)
+{
+  using Seconds = std::chrono::duration<double>;
+  return Seconds (std::chrono::steady_clock::now () - begin).count ();
+}
+
+std::string
 minutes (double seconds)
 {
   const int whole = int (seconds + 0.5);

@@ -2,9 +2,11 @@
 /* Messages and counters of elements, as texts for the user. */
 #pragma once
 
+#include <chrono>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <gst/gst.h>
 
@@ -15,6 +17,11 @@ namespace codedexposure::app
 
 /** printf into a string. */
 std::string format (const char *pattern, ...) G_GNUC_PRINTF (1, 2);
+
+/** "one, two". */
+std::string joined (const std::vector<std::string> &texts);
+
+double seconds_since (std::chrono::steady_clock::time_point begin);
 
 /** "m:ss" of a time in seconds. */
 std::string minutes (double seconds);

@@ -5,12 +5,6 @@
 namespace codedexposure::app
 {
 
-std::vector<std::string>
-camera_names ()
-{
-  return {};
-}
-
 std::string
 cameras_found ()
 {

@@ -426,8 +426,7 @@ Run::tick ()
   }
   if (ending_)
     return wait_for_receivers ();
-  const double seconds =
-      std::chrono::duration<double> (Clock::now () - began_).count ();
+  const double seconds = seconds_since (began_);
   const gint64 frames = this->frames ();
   watch_for_silence (frames);
   if (!interrupted_ && !failed_ && !(recording_ && recording_->is_removed ()))

@@ -135,8 +135,7 @@ Run::print_json (Exit exit, const std::string &flaws) const
 void
 Run::print_counters ()
 {
-  const double seconds =
-      std::chrono::duration<double> (Clock::now () - began_).count ();
+  const double seconds = seconds_since (began_);
   const double cpu = cpu_seconds () - cpu_at_start_;
   status_.line (
       format ("%.1f s, %.1f coded frames/s, %.0f %% of one processor core",

@@ -11,13 +11,12 @@ namespace codedexposure::app
 
 using namespace gst;
 
-const char *const kVideoForms =
-    ".mkv (FFV1, lossless), .mp4 (H.264), .ome.tif, .h5, .ome.zarr, / (a "
-    "folder of PNG) or %06d.png";
-
 namespace
 {
 
+constexpr const char *kVideoForms =
+    ".mkv (FFV1, lossless), .mp4 (H.264), .ome.tif, .h5, .ome.zarr, / (a "
+    "folder of PNG) or %06d.png";
 constexpr const char *kZarr = ".ome.zarr"; // a folder
 
 void

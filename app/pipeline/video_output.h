@@ -27,8 +27,6 @@ struct VideoStyle {
 enum class VideoForm { mkv, mp4, stack, pictures };
 /** None: no format has this ending. */
 std::optional<VideoForm> form_of (const std::string &name);
-/** The endings, for messages. */
-extern const char *const kVideoForms;
 
 /** Writes the pictures of @p chain to @p name. Throws Failure if its ending is
  * that of no format. */

@@ -51,7 +51,7 @@ private:
   PlayTimes times_of (const Measurement &all, std::size_t shown) const;
   /** What is written of the frame that is shown. */
   enum class Kind { split, fused, sum };
-  void write_pictures (const PageFolder &folder, ReportPage &page,
+  void write_pictures (const PageFolder &folder, const ReportPage &page,
       const PlayTimes &times, bool salvage, Kind kind);
 
   std::string recording_;
@@ -184,7 +184,7 @@ Report::times_of (const Measurement &all, std::size_t shown) const
 }
 
 void
-Report::write_pictures (const PageFolder &folder, ReportPage &page,
+Report::write_pictures (const PageFolder &folder, const ReportPage &page,
     const PlayTimes &times, bool salvage, Kind kind)
 {
   Job job ("report", run_);
@@ -245,8 +245,7 @@ Report::run ()
   options.details = true;
   const Measurement frame = measure (options);
   check_end (frame.result);
-  ReportPage page (all, frame,
-      {.recording = recording_, .line = options.line, .decode = decode_});
+  const ReportPage page (all, frame, options);
   write_pictures (folder, page, options.times, frame.salvaged, Kind::split);
   if (page.regions () > 0)
     write_pictures (folder, page, options.times, frame.salvaged, Kind::fused);

@@ -111,9 +111,9 @@ page_period (const MeasuredStream &stream, std::size_t i)
   return i > 0 ? double (pictures[i].pts - pictures[i - 1].pts) : 4e7;
 }
 
-ReportPage::ReportPage (
-    const Measurement &all, const Measurement &frame, Source source)
-    : all_ (all), frame_ (frame), source_ (std::move (source)),
+ReportPage::ReportPage (const Measurement &all, const Measurement &frame,
+    const MeasureOptions &measured)
+    : all_ (all), frame_ (frame), measured_ (measured),
       provenance_ (all.subframes.provenance.value_or (Provenance{}))
 {
   if (frame.coded.pictures.empty () || frame.subframes.pictures.empty ())
@@ -196,7 +196,7 @@ ReportPage::head () const
   const StreamSetup &setup = provenance_.setup;
   Rows rows = {
       {"Schedule", setup.schedule.text () +
-                       (source_.decode.schedule ? " (--schedule)" : "")},
+                       (measured_.decode.schedule ? " (--schedule)" : "")},
       {"Coded frames",
           format ("%zu of %s pixels, %d bits, %s frames/s",
               all_.coded.pictures.size (), size_text (all_.coded.size).c_str (),
@@ -206,7 +206,7 @@ ReportPage::head () const
               slots (), size_text (all_.subframes.size).c_str (),
               rate_text (double (slots ()) * rate ()).c_str ())},
       {"Method", provenance_.method + " (--method " +
-                     source_.decode.method.value_or ("auto") + ")"}};
+                     measured_.decode.method.value_or ("auto") + ")"}};
   if (all_.pairs > 0)
     rows.emplace_back ("Cameras",
         format ("two; %zu of %zu coded frames have one of the second camera",
@@ -313,7 +313,7 @@ ReportPage::add_pictures (Page &page, const PageFolder &folder) const
       slots () <= 16 ? "<div class=\"pair\">\n" : "<div class=\"many\">\n");
   for (const std::string &picture : coded)
     page.picture (picture, "Coded frame; dashed: the line of the profiles",
-        "frame", line_over (source_.line));
+        "frame", line_over (measured_.line));
   page.html ("<div class=\"grid\">\n");
   for (std::size_t k = 0; k < subframes.size (); k++)
     page.picture (subframes[k],
@@ -495,7 +495,7 @@ ReportPage::add_charts (Page &page, const PageFolder &folder) const
       "Mean pixel values of that frame.");
   page.html ("</div>\n").heading ("Line profiles");
   add ("profile", profile_chart (),
-      "Pixel values along " + source_.line + ", from the first to the last.",
+      "Pixel values along " + measured_.line + ", from the first to the last.",
       "chart one");
   page.heading ("Entropy").html ("<div class=\"pair\">\n");
   add ("entropy", whole_chart (true),
@@ -510,7 +510,7 @@ ReportPage::write (const PageFolder &folder) const
 {
   const int columns = std::max (int (std::ceil (std::sqrt (slots ()))), 1);
   const Extent size = all_.coded.size;
-  const std::string title = fs::path (source_.recording).filename ();
+  const std::string title = fs::path (measured_.recording).filename ();
   folder.write ("profiles.csv", profiles_csv ());
   Page page (
       title, format (".grid{display:grid;gap:8px;align-content:start;"

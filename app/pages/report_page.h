@@ -19,13 +19,10 @@ double page_period (const MeasuredStream &stream, std::size_t i);
 class ReportPage
 {
 public:
-  struct Source {
-    std::string recording, line;
-    DecodeOptions decode;
-  };
-  /** @p all the recording, @p frame  the one that is shown, with details; both
-   * outlive this. */
-  ReportPage (const Measurement &all, const Measurement &frame, Source source);
+  /** @p all the recording, @p frame  the one that is shown, with details, as
+   * @p measured says; these outlive this. */
+  ReportPage (const Measurement &all, const Measurement &frame,
+      const MeasureOptions &measured);
 
   /** The pixel value that is shown as white, in a dark scene. */
   std::optional<int> white () const { return white_; }
@@ -65,7 +62,7 @@ private:
   }
 
   const Measurement &all_, &frame_;
-  const Source source_;
+  const MeasureOptions &measured_;
   const Provenance provenance_;
   std::vector<double> counts_; ///< of pixels, for each `bin_` of their values
   double bin_ = 1;

@@ -11,6 +11,7 @@
 #include <regex>
 #include <utility>
 
+#include "common/messages.h"
 #include "pipeline/cameras.h"
 #include "pipeline/graph.h"
 
@@ -40,16 +41,21 @@ constexpr Provider kProviders[] = {
     {"ximagesink", "gstreamer1.0-x"},
 };
 
-/* Texts are quoted as in a shell command, without GStreamer's escapes; the
- * largest number means that a value is not known. */
+/* As in a shell command, without GStreamer's escapes. */
+std::string
+quoted (const std::string &text)
+{
+  return text.empty () || text.find (' ') != text.npos ? '"' + text + '"'
+                                                       : text;
+}
+
+/* The largest number means that a value is not known. */
 std::string
 value_text (const GValue *value)
 {
   if (G_VALUE_HOLDS_STRING (value)) {
     const gchar *given = g_value_get_string (value);
-    const std::string text = given ? given : "";
-    return text.empty () || text.find (' ') != text.npos ? '"' + text + '"'
-                                                         : text;
+    return quoted (given ? given : "");
   }
   if (G_VALUE_HOLDS_UINT64 (value) && g_value_get_uint64 (value) == G_MAXUINT64)
     return "unknown";
@@ -330,36 +336,23 @@ namespace
 {
 
 std::string
-number_in (const GstStructure *message, const char *field)
+number (guint64 value)
 {
-  const GValue *value = gst_structure_get_value (message, field);
-  return value ? value_text (value) : "?";
+  return value == G_MAXUINT64 ? "unknown" : std::to_string (value);
 }
 
 std::string
-seconds_in (const GstStructure *message, const char *field)
+in_seconds (GstClockTime time)
 {
-  guint64 time = 0;
-  gst_structure_get_uint64 (message, field, &time);
   return format ("%.3f s", 1e-9 * double (time));
 }
 
 std::string
-slip_in (const GstStructure *message)
+slip_text (int slots)
 {
-  gint slots = 0;
-  gst_structure_get_int (message, "slots", &slots);
-  const gint count = std::abs (slots);
+  const int count = std::abs (slots);
   return format ("%d slot%s %s", count, count == 1 ? "" : "s",
       slots < 0 ? "early" : "late");
-}
-
-std::string
-mirrors_in (const GstStructure *message, const char *field)
-{
-  gdouble mirrors = 0;
-  gst_structure_get_double (message, field, &mirrors);
-  return format ("%+.2f", mirrors);
 }
 
 } // namespace
@@ -367,64 +360,66 @@ mirrors_in (const GstStructure *message, const char *field)
 std::string
 notice (const GstStructure *message)
 {
-  const std::string_view name = gst_structure_get_name (message);
-  const auto number = [&] (const char *field) {
-    return number_in (message, field);
-  };
   const std::string of = gst_structure_has_field (message, "camera")
                              ? " of the second camera"
                              : "";
-  if (name == "codedexposure/frames-lost")
+  if (const auto lost = from_structure<FramesLost> (message))
     return "warning: coded frames" + of + " were lost before " +
-           seconds_in (message, "to") + ": " + number ("count");
-  if (name == "dmdsync/frame-incomplete")
-    return "warning: frame " + number ("frame") +
+           in_seconds (lost->to) + ": " + number (lost->count);
+  if (const auto incomplete = from_structure<FrameIncomplete> (message))
+    return "warning: frame " + number (incomplete->frame) +
            " arrived incomplete; check the connection of the camera";
-  if (name == "dmdsync/frame-late")
-    return "warning: frame " + number ("frame") + " arrived after the next one";
-  if (name == "dmdsync/slip")
-    return "warning: from frame " + number ("frame") + " on, the mirrors are " +
-           slip_in (message) + "; these frames are flagged";
-  gboolean active = TRUE;
-  gst_structure_get_boolean (message, "active", &active);
-  if (name == "codedexposure/frames-damaged" && active)
-    return "warning: from frame " + number ("frame") + " (" +
-           seconds_in (message, "from") + ") on, frames" + of +
-           " are flagged: " + number ("reason");
-  if (name == "codedexposure/frames-damaged")
-    return "warning: frames" + of + " that are flagged from frame " +
-           number ("frame") + " on: " + number ("count");
-  if (name == "codedexposure/partner-lost" && active)
-    return "warning: from " + seconds_in (message, "from") +
-           " on, coded frames have no partner of the second camera: " +
-           number ("reason");
-  if (name == "codedexposure/partner-lost")
-    return "warning: coded frames without a partner from " +
-           seconds_in (message, "from") + " on: " + number ("frames");
-  if (name == "codedexposure/partner-drift" && active)
-    return "warning: the second camera sees the mirrors at " +
-           mirrors_in (message, "x") + ", " + mirrors_in (message, "y") +
-           " mirrors (right, down) from where its mapping has them, above the "
-           "limit of 0.1: a camera was moved; calibrate both again";
-  if (name == "codedexposure/partner-drift")
-    return "the second camera sees the mirrors where its mapping has them "
-           "again";
-  if (name == "codedexposure/frames-missing")
-    return "warning: from " + seconds_in (message, "from") +
-           " on, recorded frames" + of + " are missing: " + number ("count");
-  if (name == "codedexposure/stream-cut")
+  if (const auto late = from_structure<FrameLate> (message))
+    return "warning: frame " + number (late->frame) +
+           " arrived after the next one";
+  if (const auto slip = from_structure<Slip> (message))
+    return "warning: from frame " + number (slip->frame) +
+           " on, the mirrors are " + slip_text (slip->slots) +
+           "; these frames are flagged";
+  if (const auto damaged = from_structure<FramesDamaged> (message))
+    return damaged->active
+               ? "warning: from frame " + number (damaged->frame) + " (" +
+                     in_seconds (damaged->from) + ") on, frames" + of +
+                     " are flagged: " + quoted (damaged->reason)
+               : "warning: frames" + of + " that are flagged from frame " +
+                     number (damaged->frame) +
+                     " on: " + number (damaged->count.value_or (0));
+  if (const auto lost = from_structure<PartnerLost> (message))
+    return lost->active ? "warning: from " + in_seconds (lost->from) +
+                              " on, coded frames have no partner of the second "
+                              "camera: " +
+                              quoted (lost->reason)
+                        : "warning: coded frames without a partner from " +
+                              in_seconds (lost->from) +
+                              " on: " + number (lost->frames.value_or (0));
+  if (const auto drifted = from_structure<PartnerDrifted> (message))
+    return drifted->active
+               ? format (
+                     "warning: the second camera sees the mirrors at %+.2f, "
+                     "%+.2f mirrors (right, down) from where its mapping "
+                     "has them, above the limit of 0.1: a camera was moved; "
+                     "calibrate both again",
+                     drifted->x, drifted->y)
+               : "the second camera sees the mirrors where its mapping has "
+                 "them "
+                 "again";
+  if (const auto missing = from_structure<FramesMissing> (message))
+    return "warning: from " + in_seconds (missing->from) +
+           " on, recorded frames" + of +
+           " are missing: " + number (missing->count);
+  if (from_structure<StreamCut> (message))
     return "warning: the stream" + of +
            " ended without its last line: it was cut off, its sender was "
            "stopped, or it is a segment of a longer recording";
-  if (name == "codedexposure/stream-incomplete")
+  if (const auto incomplete = from_structure<StreamIncomplete> (message))
     return "warning: recorded frames" + of +
-           " are missing with all that is known of them: " + number ("count") +
+           " are missing with all that is known of them: " +
+           number (incomplete->count) +
            "; the recording is damaged, or this is not its first part";
-  if (name == "codedexposure/camera-back")
-    return "the camera sends frames again, after " +
-           seconds_in (message, "silent");
-  if (name == "moirecalib/phase")
-    return "phase found: --schedule " + number ("schedule");
+  if (const auto back = from_structure<CameraBack> (message))
+    return "the camera sends frames again, after " + in_seconds (back->silent);
+  if (const auto phase = from_structure<MoirePhase> (message))
+    return "phase found: --schedule " + quoted (phase->schedule);
   return {};
 }
 

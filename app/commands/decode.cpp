@@ -158,8 +158,9 @@ Decode::declare_relations (Options &options)
   options.exclude ({"--output", "--coded", "--uncertainty", "--method",
                        "--mapping", "--fuse", "--region"},
       "--find-phase");
-  options.exclude ({"--coded", "--uncertainty", "--start", "--duration",
-                       "--excerpt", "--find-phase", "--print"},
+  options.exclude (
+      {"--coded", "--uncertainty", "--start", "--duration", "--excerpt",
+          "--find-phase", "--print", "--json", "--verbose", "--threads"},
       "--jobs");
 }
 

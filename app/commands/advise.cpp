@@ -21,7 +21,7 @@ namespace
 struct Arguments : Printing, BoardOptions {
   Conditions conditions;
   std::vector<std::string> schedules;
-  std::string readout = "0";
+  Nanoseconds readout = 0;
   std::optional<Text> bench;
   /* In place of those of the bench profile: */
   std::optional<Extent> size;
@@ -40,10 +40,8 @@ struct Finding {
 std::vector<Schedule>
 candidates (const Arguments &arguments, const DmdInfo &board)
 {
-  const Nanoseconds readout =
-      value_of (parse_time (arguments.readout), Exit::usage);
   if (arguments.schedules.empty ())
-    return usual_schedules (board.minimum_switching, readout);
+    return usual_schedules (board.minimum_switching, arguments.readout);
   std::vector<Schedule> schedules;
   for (const std::string &text : arguments.schedules)
     schedules.push_back (value_of (Schedule::parse (text), Exit::usage));

@@ -20,6 +20,7 @@
 #include "emulation/own_network.h"
 #include "emulation/served_bench.h"
 #include "emulation/shared_trigger.h"
+#include "options/board.h"
 #include "pipeline/plugin.h"
 #include "pipeline/source.h"
 #include "pipeline/status.h"
@@ -58,7 +59,8 @@ private:
 
   SourceOptions source_;
   SourcePlan plan_;
-  std::optional<Text> dmd_, faults_, jitter_, address_;
+  std::optional<Text> dmd_, faults_, address_;
+  std::optional<Nanoseconds> jitter_;
   std::optional<int> cameras_;
   std::optional<double> drift_, packet_loss_, trigger_rate_;
   bool no_outputs_ = false, log_ = false, verbose_ = false, second_ = false;
@@ -116,7 +118,7 @@ Bench::declare (Options &options)
       "how much the clock of the camera is fast [0]",
       real (-500, 500, "a number of ppm from -500 to 500"));
   options.value ("--jitter", jitter_, "TIME",
-      "max random delay of frames, such as 5ms [0]");
+      "max random delay of frames, such as 5ms [0]", time_rule ("5ms"));
   options.value ("--packet-loss", packet_loss_, "P",
       "part of the network packets that is lost, 0 to 1 [0]",
       real (0, 1, "a number from 0 to 1"));
@@ -155,8 +157,6 @@ Bench::declare (Options &options)
 void
 Bench::check () const
 {
-  if (jitter_ && !parse_time (*jitter_))
-    usage_error ("--jitter must be a time such as 5ms, not " + *jitter_);
   if (dmd_ && command_.empty ())
     usage_error ("--dmd needs a COMMAND");
   if (address_ && !command_.empty ())
@@ -175,10 +175,9 @@ Bench::camera_options (int number) const
   options.trigger_rate = trigger_rate_.value_or (
       double (plan_.frame_rate.num) / plan_.frame_rate.den);
   options.drift = drift_.value_or (0);
-  options.jitter = jitter_ ? *parse_time (*jitter_) : 0;
+  options.jitter = jitter_.value_or (0);
   options.packet_loss = packet_loss_.value_or (0);
-  if (source_.seed)
-    options.seed = std::stoull (*source_.seed);
+  options.seed = source_.seed.value_or (options.seed);
   options.outputs = !no_outputs_;
   options.set_up = [this] (const CameraSettings &settings) {
     std::fprintf (stderr, "bench: the camera sends %s\n",
@@ -218,7 +217,7 @@ Bench::open_camera (int number)
   Settings beam;
   if (second_ && number == 2) {
     beam = {{"beam", "off"}};
-    source.seed = std::to_string (1 + std::stoull (source.seed.value_or ("0")));
+    source.seed = 1 + source.seed.value_or (0);
   }
   Chain chain = simulation (*opened.job, source, plan_, Pace::fast, beam);
   limit_frames (*opened.job, source_, chain);
@@ -275,10 +274,9 @@ Bench::words () const
     return command_;
   std::vector<std::string> live{"/proc/self/exe", "live", "--camera",
       "127.0.0.1", "--size", size_text (plan_.size), "--frame-rate",
-      std::to_string (plan_.frame_rate.num) + "/" +
-          std::to_string (plan_.frame_rate.den),
-      "--pixel-format", plan_.bits > 8 ? "Mono16" : "Mono8", "--schedule",
-      source_.schedule.value_or ("sequential:2x2")};
+      rate_text (plan_.frame_rate), "--pixel-format",
+      plan_.bits > 8 ? "Mono16" : "Mono8", "--schedule",
+      source_.schedule_text ()};
   if (second_)
     live.insert (live.end (), {"--second", "--second-camera", "127.0.0.2"});
   return live;

@@ -109,7 +109,7 @@ Calibrate::declare (Options &options)
 void
 Calibrate::set_up_bench ()
 {
-  const std::string schedule = source_.schedule.value_or ("sequential:2x2");
+  const std::string schedule = source_.schedule_text ();
   if (!source_.pattern && !source_.input && !source_.scene)
     source_.pattern = "white";
   if (!source_.gain && schedule.starts_with ("sequential:"))

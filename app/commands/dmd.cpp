@@ -28,7 +28,7 @@ using Clock = std::chrono::steady_clock;
 
 struct Arguments : Printing, BoardOptions {
   std::string device = "usb:";
-  std::string duration;
+  std::optional<Nanoseconds> duration; ///< none: until Ctrl-C
   std::string mask = "0";
   bool predict = false;
   std::stop_token stop; ///< requested by SIGINT or SIGTERM
@@ -176,26 +176,17 @@ upload (const Arguments &arguments)
   return Exit::done;
 }
 
-/** The value of --for. */
-std::optional<std::chrono::nanoseconds>
-duration_of (const Arguments &arguments)
-{
-  if (arguments.duration.empty ())
-    return std::nullopt;
-  return std::chrono::nanoseconds (
-      value_of (parse_time (arguments.duration), Exit::usage));
-}
-
 /** Waits while @p dmd shows masks, then stops it. */
 Exit
-run (const Arguments &arguments, Dmd &dmd,
-    std::optional<std::chrono::nanoseconds> duration, const Json &result)
+run (const Arguments &arguments, Dmd &dmd, const Json &result)
 {
+  constexpr Nanoseconds kDay = 24 * 3'600'000'000'000;
+  const auto &duration = arguments.duration;
   arguments.say ("running; press Ctrl-C to stop");
   bool over = false;
   do
-    over =
-        wait_for (arguments.stop, duration.value_or (std::chrono::hours (24)));
+    over = wait_for (
+        arguments.stop, std::chrono::nanoseconds (duration.value_or (kDay)));
   while (over && !duration);
   dmd.stop ();
   if (dmd.running ())
@@ -208,13 +199,12 @@ run (const Arguments &arguments, Dmd &dmd,
 Exit
 start (const Arguments &arguments)
 {
-  const auto duration = duration_of (arguments);
   const auto dmd = open (arguments);
   const auto [schedule, plan] = fit (arguments, dmd->info ());
   Json result{{"device", dmd->info ().name}};
   send (arguments, *dmd, schedule, result);
   value_of (dmd->start (plan, arguments.stop), Exit::failed);
-  return run (arguments, *dmd, duration, result);
+  return run (arguments, *dmd, result);
 }
 
 /** A mask that is shown in all slots: "on", "off", or a number of a mask of the
@@ -240,13 +230,12 @@ still_mask (const Schedule &schedule, const std::string &name)
 Exit
 show (const Arguments &arguments)
 {
-  const auto duration = duration_of (arguments);
   const auto dmd = open (arguments);
   const auto [schedule, plan] = fit (arguments, dmd->info ());
   const StillMask mask = still_mask (schedule, arguments.mask);
   value_of (dmd->show (mask, plan, arguments.stop), Exit::failed);
-  return run (arguments, *dmd, duration,
-      {{"device", dmd->info ().name}, {"shows", mask.name}});
+  return run (
+      arguments, *dmd, {{"device", dmd->info ().name}, {"shows", mask.name}});
 }
 
 /** Waits until standard input ends, which means that the process that started

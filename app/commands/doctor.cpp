@@ -202,7 +202,7 @@ Result<std::unique_ptr<Rig>>
 Doctor::open_bench (Finding &missing)
 {
   if (source_.is_simulated ()) {
-    const std::uint64_t seed = std::stoull (source_.seed.value_or ("1"));
+    const std::uint64_t seed = source_.seed.value_or (1);
     SickBenchOptions options =
         random_healthy_bench (seed, {.rate = plan_.frame_rate});
     if (plan_.bench) {
@@ -329,13 +329,13 @@ Doctor::next_commands () const
       !second_         ? ""
       : beside_.camera ? " --both --second-camera \"" + *beside_.camera + "\""
                        : " --both";
-  const std::string record =
-      source_.is_simulated ()
-          ? (second_ ? "record" : "simulate") + second + " --scene pour" +
-                bench + " --frames 50"
-          : "record --camera \"" + *source_.camera + "\"" + second +
-                " --device " + *source_.device + " --schedule " +
-                source_.schedule.value_or ("sequential:2x2") + bench;
+  const std::string record = source_.is_simulated ()
+                                 ? (second_ ? "record" : "simulate") + second +
+                                       " --scene pour" + bench + " --frames 50"
+                                 : "record --camera \"" + *source_.camera +
+                                       "\"" + second + " --device " +
+                                       *source_.device + " --schedule " +
+                                       source_.schedule_text () + bench;
   return {"codedexposure " + record + " --output coded.mkv",
       "codedexposure decode coded.mkv --fuse best --output fused.mkv"};
 }

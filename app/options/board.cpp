@@ -43,12 +43,14 @@ Printing::say (const std::string &line) const
     std::fprintf (stderr, "%s\n", line.c_str ());
 }
 
-Rule<Text>
-time_rule ()
+Rule<Nanoseconds>
+time_rule (const std::string &such)
 {
-  return text_that (
-      [] (const std::string &text) { return bool (parse_time (text)); },
-      "a time such as 500us or 10s");
+  return {[] (const std::string &text) {
+            const auto time = parse_time (text);
+            return time ? std::optional (*time) : std::nullopt;
+          },
+      "a time such as " + such};
 }
 
 void

@@ -48,8 +48,8 @@ struct Show {
 /** Throws Failure if the schedule does not fit the device or the rate. */
 Show fit (const BoardOptions &options, const DmdInfo &info);
 
-/** A time such as 500us or 10s, as text. */
-Rule<Text> time_rule ();
+/** A time such as 500us or 10s. @p such  the examples for a message. */
+Rule<Nanoseconds> time_rule (const std::string &such = "500us or 10s");
 
 /** Requests a stop at SIGINT, SIGTERM and SIGHUP, for work that is no pipeline.
  * Make it before any thread starts. */

@@ -76,12 +76,14 @@ SourceOptions::declare_bench (Options &options, Kind kind)
                  "recordings carry it, and other options win");
   options.value ("--seed", seed, "N",
       examined ? "seed of the simulated bench [1]" : "seed of the noise [0]",
-      text_that (
-          [] (const std::string &text) {
-            return !text.empty () && text.size () < 20 &&
-                   text.find_first_not_of ("0123456789") == text.npos;
+      Rule<std::uint64_t>{
+          [] (const std::string &text) -> std::optional<std::uint64_t> {
+            if (text.empty () || text.size () >= 20 ||
+                text.find_first_not_of ("0123456789") != text.npos)
+              return std::nullopt;
+            return std::stoull (text);
           },
-          "a whole number"));
+          "a whole number"});
   if (examined) {
     options.exclude ({"--bench", "--seed"}, "--camera");
     return;
@@ -167,6 +169,12 @@ SourceOptions::declare (Options &options, Kind kind)
   if (kind != Kind::examined)
     declare_scene (options, kind);
   declare_bench (options, kind);
+}
+
+std::string
+rate_text (FrameRate rate)
+{
+  return std::to_string (rate.num) + "/" + std::to_string (rate.den);
 }
 
 BenchProfile
@@ -278,7 +286,7 @@ SourcePlan::make (const SourceOptions &options)
   if (options.is_simulated () && options.device == "external")
     usage_error ("--device external is for a DMD beside a camera, and the "
                  "simulated bench has none; set --camera, or leave it out");
-  const std::string text = options.schedule.value_or ("sequential:2x2");
+  const std::string text = options.schedule_text ();
   auto schedule = Schedule::parse (text);
   if (!schedule)
     usage_error (

@@ -31,7 +31,8 @@ struct SourceOptions {
   std::optional<Extent> size;
   std::optional<int> bits;
   /* Bench */
-  std::optional<Text> schedule, bench, seed;
+  std::optional<Text> schedule, bench;
+  std::optional<std::uint64_t> seed;
   std::optional<FrameRate> frame_rate;
   std::optional<int> frames;
   std::optional<double> full_well, read_noise, psf_sigma, gain;
@@ -44,12 +45,19 @@ struct SourceOptions {
   bool off_beam = false; ///< of --bench, the second camera is meant
 
   bool is_simulated () const { return !camera && !source; }
+  std::string schedule_text () const
+  {
+    return schedule.value_or ("sequential:2x2");
+  }
 
 private:
   void declare_scene (Options &options, Kind kind);
   void declare_bench (Options &options, Kind kind);
   void declare_camera (Options &options, Kind kind);
 };
+
+/** "30000/1001" */
+std::string rate_text (FrameRate rate);
 
 /** A second camera, in the beam of the mirrors that are off. */
 struct SecondCamera {

@@ -13,6 +13,7 @@
 #include "failure.h"
 #include "pipeline/graph.h"
 #include "pipeline/messages.h"
+#include "pipeline/source.h"
 
 namespace codedexposure::app
 {
@@ -38,10 +39,7 @@ ffv1_speed (const SourcePlan &plan)
   Graph graph;
   Chain chain =
       graph.begin ("videotestsrc", {{"num-buffers", 1}, {"pattern", "snow"}});
-  chain
-      .caps (format ("video/x-raw,format=%s,width=%d,height=%d,framerate=%d/%d",
-          plan.is_deep () ? "GRAY16_LE" : "GRAY8", plan.size.width,
-          plan.size.height, plan.frame_rate.num, plan.frame_rate.den))
+  chain.caps (grey_caps (plan, plan.frame_rate))
       .to ("imagefreeze", {{"num-buffers", frames}})
       .to ("codedexposure-recordmux")
       .to ("fakesink", {{"sync", false}});

@@ -13,15 +13,6 @@ namespace codedexposure::app
 
 using namespace gst;
 
-namespace
-{
-
-std::string
-rate_text (FrameRate rate)
-{
-  return std::to_string (rate.num) + "/" + std::to_string (rate.den);
-}
-
 std::string
 grey_caps (const SourcePlan &plan, FrameRate rate)
 {
@@ -33,6 +24,9 @@ grey_caps (const SourcePlan &plan, FrameRate rate)
          (plan.is_deep () ? "GRAY16_LE" : "GRAY8") + size +
          ",framerate=" + rate_text (rate);
 }
+
+namespace
+{
 
 /* Every frame of the file becomes one slot, so its times are scaled. videorate
  * counts them from 0, and not every file begins at 0. */
@@ -178,7 +172,7 @@ synchronise (
 {
   if (options.source && !options.device && !options.schedule)
     return;
-  Settings settings{{"schedule", options.schedule.value_or ("sequential:2x2")}};
+  Settings settings{{"schedule", options.schedule_text ()}};
   set_if (settings, "device", options.device);
   if (options.camera)
     settings.emplace_back ("timestamp-at", "device-clock");
@@ -192,7 +186,7 @@ void
 simulate_camera (Job &job, const SourceOptions &options, const SourcePlan &plan,
     Chain &chain, const Settings &more)
 {
-  Settings settings{{"schedule", options.schedule.value_or ("sequential:2x2")}};
+  Settings settings{{"schedule", options.schedule_text ()}};
   set_if (settings, "bench", options.bench);
   set_if (settings, "psf-sigma", options.psf_sigma);
   set_if (settings, "full-well", options.full_well);
@@ -304,9 +298,7 @@ coded_sources (Job &job, const SourceOptions &options, const SourcePlan &plan,
   SourceOptions other = second.options (options);
   std::pair<Chain, Chain> both = [&] {
     if (!options.camera) {
-      other.seed = std::to_string (
-          1 +
-          std::strtoull (options.seed.value_or ("0").c_str (), nullptr, 10));
+      other.seed = 1 + options.seed.value_or (0);
       if (second.simulate)
         second.simulate (other);
       return simulated_cameras (job, options, plan, pace, other);

@@ -13,6 +13,9 @@ enum class Pace {
   fast, ///< as fast as they can be made
 };
 
+/** Of the frames of @p plan, at that rate. */
+std::string grey_caps (const SourcePlan &plan, FrameRate rate);
+
 /** The scene and the simulated bench, whose masks come from the schedule. */
 Chain simulation (Job &job, const SourceOptions &options,
     const SourcePlan &plan, Pace pace, const Settings &more = {});

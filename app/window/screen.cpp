@@ -14,13 +14,14 @@ namespace codedexposure::app
 namespace
 {
 
-/* libX11 is where a sink for X is; without one, no window needs it. */
+/* Null, and @has_all is false: there is none of that name. */
 template <typename Function>
 Function *
-function_of (void *library, const char *name)
+function_of (void *library, const char *name, bool &has_all)
 {
-  return library ? reinterpret_cast<Function *> (dlsym (library, name))
-                 : nullptr;
+  void *found = library ? dlsym (library, name) : nullptr;
+  has_all &= found != nullptr;
+  return reinterpret_cast<Function *> (found);
 }
 
 using XDisplay = void;
@@ -42,11 +43,14 @@ struct XMessage {
   long rest[12];
 };
 
-/* The functions of libX11 that are used here. */
+/* The functions of libX11 that are used here. It is where a sink for X is;
+ * without one, no window needs it. */
 struct X {
   void *library = dlopen ("libX11.so.6", RTLD_LAZY);
+  bool has_all = true;
 #define X_FUNCTION(type, name)                                                 \
-  std::add_pointer_t<type> name = function_of<type> (library, "X" #name)
+  std::add_pointer_t<type> name =                                              \
+      function_of<type> (library, "X" #name, has_all)
   X_FUNCTION (int (), InitThreads);
   X_FUNCTION (XDisplay *(const char *), OpenDisplay);
   X_FUNCTION (int (XDisplay *), CloseDisplay);
@@ -66,14 +70,6 @@ struct X {
   X_FUNCTION (int (XDisplay *, int), Sync);
   X_FUNCTION (OnError *(OnError *), SetErrorHandler);
 #undef X_FUNCTION
-
-  bool has_all () const
-  {
-    return InitThreads && OpenDisplay && CloseDisplay && DefaultScreen &&
-           DisplayWidth && DisplayHeight && DefaultRootWindow && InternAtom &&
-           QueryTree && GetWindowProperty && SendEvent && Free && Sync &&
-           SetErrorHandler;
-  }
 };
 
 /* The process that says that it owns @window; 0: none. */
@@ -120,7 +116,7 @@ Screen
 find_screen ()
 {
   const X x;
-  if (!x.has_all ())
+  if (!x.has_all)
     return {};
   x.InitThreads ();
   XDisplay *display = x.OpenDisplay (nullptr);
@@ -140,7 +136,7 @@ set_full_screen (bool full)
   constexpr int kClientMessage = 33;
   constexpr long kToRoot = (1L << 20) | (1L << 19); // substructure
   const X x;
-  XDisplay *display = x.has_all () ? x.OpenDisplay (nullptr) : nullptr;
+  XDisplay *display = x.has_all ? x.OpenDisplay (nullptr) : nullptr;
   if (!display)
     return false;
   /* Windows of others that close meanwhile would end this program. */

@@ -369,14 +369,14 @@ Decode::run ()
     value_of (recording_info (*second_, false));
   if (jobs_.value_or (1) > 1)
     decode_on_cores ();
+  Status status ("decode", false);
   bool found = false;
   RunResult result = play_once (false, found);
   if (run_.print)
     return result.exit;
   if (result.container_damaged) {
-    Status ("decode", false)
-        .line (recording_ + " is damaged between its frames; reading it from "
-                            "front to back");
+    status.line (recording_ + " is damaged between its frames; reading it from "
+                              "front to back");
     result = play_once (true, found);
   }
   if (info.is_cut_short && result.exit == Exit::failed && result.frames == 0)
@@ -384,18 +384,15 @@ Decode::run ()
   if (info.is_cut_short && result.exit == Exit::done)
     result.exit = Exit::damaged;
   if (result.exit == Exit::damaged)
-    Status ("decode", false)
-        .line (
-            recording_ + (second_ ? " or " + *second_ : "") +
-            " is cut off or damaged; what could be decoded was" +
-            (unflagged_ > 0 ? ""
-                            : ", and pictures of damaged frames are flagged"));
+    status.line (
+        recording_ + (second_ ? " or " + *second_ : "") +
+        " is cut off or damaged; what could be decoded was" +
+        (unflagged_ > 0 ? "" : ", and pictures of damaged frames are flagged"));
   if (unflagged_ > 0)
-    Status ("decode", false)
-        .line (".mp4 has no place for the flags of " +
-               std::to_string (unflagged_) +
-               " pictures of damaged or unsynchronised frames; add "
-               "--statistics FILE.csv, which lists them, or use another form");
+    status.line (
+        ".mp4 has no place for the flags of " + std::to_string (unflagged_) +
+        " pictures of damaged or unsynchronised frames; add "
+        "--statistics FILE.csv, which lists them, or use another form");
   if (find_phase_ && result.exit == Exit::done && !found && !run_.print)
     return Exit::failed;
   return result.exit;

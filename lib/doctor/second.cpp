@@ -352,9 +352,8 @@ SecondRun::measure_light ()
       bright.mean, [&] (int x, int y) { full += bright.full.at (x, y) > 0; });
   const double pixels = double (bright.mean.width ()) * bright.mean.height ();
   finding_.measure ("second-bright", {100 * full / pixels, 0.0});
-  const auto light_of = [] (const Measured &bright, const Measured &dark) {
-    return Measured{
-        bright.value - dark.value, std::hypot (bright.sigma, dark.sigma)};
+  const auto light_of = [] (const Measured &on, const Measured &off) {
+    return Measured{on.value - off.value, std::hypot (on.sigma, off.sigma)};
   };
   /* Dark pixels may all be rounded alike. */
   const auto rounded = [] (Measured dark) {

@@ -61,7 +61,7 @@ PartnerDrift::PartnerDrift (
         (2 * (i % kParts) + 1) * width / (2 * kParts) - part_.width / 2;
     const int top =
         (2 * (i / kParts) + 1) * rows / (2 * kParts) - part_.height / 2;
-    Part part{.middle = {left + part_.width / 2.0, top + part_.height / 2.0}};
+    Part part{{left + part_.width / 2.0, top + part_.height / 2.0}, {}, {}};
     bool is_seen = true;
     for (int y = top; y < top + part_.height; y++)
       for (int x = left; x < left + part_.width; x++) {

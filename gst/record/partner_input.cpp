@@ -146,8 +146,9 @@ PartnerInput::let_wait (bool waits)
 
 /* A frame that came late when it was recorded is in the place of its partner,
  * too. */
-std::optional<Partner>
-PartnerInput::take (GstElement *element, GstClockTime pts)
+bool
+PartnerInput::take (
+    GstElement *element, GstClockTime pts, std::optional<Partner> &to)
 {
   std::unique_lock lock (lock_);
   const auto time_of = [] (const Partner &partner) {
@@ -170,22 +171,24 @@ PartnerInput::take (GstElement *element, GstClockTime pts)
   }
   const auto found = own ();
   if (found == partners_.end ())
-    return {};
-  Partner partner = std::move (*found);
+    return may_wait_ && !is_flushing_;
+  to = std::move (*found);
   partners_.erase (partners_.begin (), std::next (found));
   moved_.notify_all ();
-  return partner;
+  return true;
 }
 
-void
+bool
 PartnerInput::attach (
     GstElement *element, GstBuffer *frame, bool wanted, bool encoded)
 {
   want (wanted);
   if (!wanted)
-    return;
+    return true;
   const GstClockTime pts = GST_BUFFER_PTS (frame);
-  const auto partner = take (element, pts);
+  std::optional<Partner> partner;
+  if (!take (element, pts, partner))
+    return false;
   GstBuffer *buffer = partner ? partner->buffer.get () : nullptr;
   const bool is_missing =
       !buffer || GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_GAP);
@@ -196,6 +199,7 @@ PartnerInput::attach (
       is_of_use    ? nullptr
       : is_missing ? "missing"
                    : "damaged");
+  return true;
 }
 
 void

@@ -42,8 +42,9 @@ public:
    * damaged partner, or one that stands in for a lost one, is only given to
    * frames that are @p encoded, to be recorded again with them.
    * @p wanted: the setup says that frames have partners; if not, those that
-   * come are dropped: other files may have further tracks, too. */
-  void attach (
+   * come are dropped: other files may have further tracks, too.
+   * False: a flush or a stop began, and the frame goes no further. */
+  bool attach (
       GstElement *element, GstBuffer *frame, bool wanted, bool encoded);
   /** After a flush. */
   void forget () { alone_.forget (); }
@@ -59,8 +60,9 @@ private:
       gboolean active) noexcept;
 
   void want (bool wanted);
-  /** That with the time @p pts; those before it are dropped. */
-  std::optional<Partner> take (GstElement *element, GstClockTime pts);
+  /** That with the time @p pts, if there is one; those before it are dropped.
+   * False: a flush or a stop began before it came. */
+  bool take (GstElement *element, GstClockTime pts, std::optional<Partner> &to);
 
   GstPad *pad_ = nullptr;
   AloneFrames alone_;

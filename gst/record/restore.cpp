@@ -401,8 +401,9 @@ push_frame (Self *self, BufferPtr frame, const TrackReader::Match &match)
     keep_in_segment (state, time, GST_BUFFER_PTS (frame.get ()));
   } else
     mark_unknown (state, frame.get ());
-  state.partners.attach (GST_ELEMENT (self), frame.get (),
-      state.setup && state.setup->partner, state.encoded);
+  if (!state.partners.attach (GST_ELEMENT (self), frame.get (),
+          state.setup && state.setup->partner, state.encoded))
+    return GST_FLOW_FLUSHING;
   if (GST_BUFFER_PTS_IS_VALID (frame.get ()))
     state.segment.position = GST_BUFFER_PTS (frame.get ());
   if (GST_BUFFER_DURATION_IS_VALID (frame.get ()))

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* Recordings of coded frames with partners: what comes out is what went in,
  * also where frames are alone, after seeks, and from damaged files. */
+#include <atomic>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -282,6 +283,36 @@ TEST_F (RecordPairs, FramesAfterASeekHaveTheirs)
         live.partners.rbegin ()));
     EXPECT_GE (played.times.size (), kFrames - first - 1);
   }
+}
+
+/* A frame that waits for its partner when a flush comes is not alone. */
+TEST_F (RecordPairs, ASeekTakesNoPartnersAway)
+{
+  constexpr int kSeeks = 2000;
+  Seen live;
+  record (live);
+  Pipeline pipeline ("filesrc location=" + at ("both.mkv") +
+                     "! codedexposure-recorddemux ! fakesink name=out");
+  const auto owned = top_of (pipeline, "out");
+  GstElement *top = owned.get ();
+  std::atomic<int> alone = 0;
+  const ObjectPtr<GstBus> bus (gst_element_get_bus (top));
+  gst_bus_set_sync_handler (
+      bus.get (),
+      [] (GstBus *, GstMessage *message, gpointer count) {
+        if (parse_message<PartnerLost> (message))
+          ++*static_cast<std::atomic<int> *> (count);
+        return GST_BUS_PASS;
+      },
+      &alone, nullptr);
+  gst_element_set_state (top, GST_STATE_PLAYING);
+  gst_element_get_state (top, nullptr, nullptr, kPatience);
+  for (int i = 0; i < kSeeks; i++)
+    ASSERT_TRUE (gst_element_seek_simple (top, GST_FORMAT_TIME,
+        GstSeekFlags (GST_SEEK_FLAG_FLUSH | GST_SEEK_FLAG_ACCURATE),
+        gint64 (guint64 (i % 7) * kPeriod)));
+  ASSERT_EQ (pipeline.play (), "");
+  EXPECT_EQ (alone, 0);
 }
 
 TEST_F (RecordPairs, AFileThatIsCutOffHasThemUpToThere)

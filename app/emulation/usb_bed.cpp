@@ -222,6 +222,8 @@ private:
     switch (request) {
     case USBDEVFS_GET_CAPABILITIES: {
       const Reference value = resolve (argument (), 0, sizeof (std::uint32_t));
+      if (!value)
+        return fail (error, EFAULT);
       *as<std::uint32_t> (value) = USBDEVFS_CAP_REAP_AFTER_DISCONNECT;
       return 0;
     }
@@ -252,11 +254,15 @@ private:
         return fail (error, ENODATA);
       const Reference value =
           resolve (argument, 0, sizeof (usbdevfs_getdriver));
+      if (!value)
+        return fail (error, EFAULT);
       std::strcpy (as<usbdevfs_getdriver> (value)->driver, "usbhid");
       return 0;
     }
     case USBDEVFS_IOCTL: {
       const Reference value = resolve (argument, 0, sizeof (usbdevfs_ioctl));
+      if (!value)
+        return fail (error, EFAULT);
       const auto code = std::uint32_t (as<usbdevfs_ioctl> (value)->ioctl_code);
       if (code == USBDEVFS_DISCONNECT && !bound_)
         return fail (error, ENODATA);
@@ -287,7 +293,7 @@ private:
     urb.owner = std::make_unique<Owner> (client);
     urb.urb = resolve (argument, 0, sizeof (usbdevfs_urb));
     if (!urb.urb.get ())
-      return fail (error, EFAULT); // killed in the middle
+      return fail (error, EFAULT);
     urb.address = urb.urb.get ()->client_addr;
     const int length = urb.get ()->buffer_length;
     if (length > 0)

@@ -45,6 +45,8 @@ Run::Run (Job &job)
 Run::~Run ()
 {
   stop ();
+  if (patience_)
+    g_source_remove (patience_);
   g_main_loop_unref (loop_);
 }
 
@@ -272,11 +274,13 @@ Run::end_after_error (GstObject *failed)
   if (GST_IS_ELEMENT (failed))
     gst_element_call_async (
         GST_ELEMENT (failed), end_at_sources, nullptr, nullptr);
-  const auto on_timeout = [] (gpointer self) {
-    static_cast<Run *> (self)->end (Exit::failed);
+  const auto on_timeout = [] (gpointer data) {
+    auto *self = static_cast<Run *> (data);
+    self->patience_ = 0;
+    self->end (Exit::failed);
     return gboolean (G_SOURCE_REMOVE);
   };
-  g_timeout_add_seconds (kPatience, on_timeout, this);
+  patience_ = g_timeout_add_seconds (kPatience, on_timeout, this);
 }
 
 void

@@ -156,7 +156,7 @@ Decode::declare_relations (Options &options)
   options.exclude ({"--region", "--method"}, "--fuse");
   options.exclude ({"--start", "--duration", "--find-phase"}, "--excerpt");
   options.exclude ({"--output", "--coded", "--uncertainty", "--method",
-                       "--mapping", "--fuse", "--region"},
+                       "--mapping", "--bench", "--bits", "--fuse", "--region"},
       "--find-phase");
   options.exclude (
       {"--coded", "--uncertainty", "--start", "--duration", "--excerpt",
@@ -266,8 +266,6 @@ Decode::build (Job &job)
 {
   unflagged_ = 0;
   Chain frames = read (job);
-  if (threads_)
-    g_object_set (job.reader, "threads", guint (*threads_), nullptr);
   DecoderPads pads = decode_.fuse ? add_fusion (job, frames, decode_, threads_)
                                   : add_demux (job, frames, decode_, region_);
   job.times = times ();
@@ -322,6 +320,8 @@ Decode::play_once (bool salvage, bool &found)
     build_search (job);
   else
     build (job);
+  if (threads_)
+    g_object_set (job.reader, "threads", guint (*threads_), nullptr);
   job.on_message = [&found] (const GstStructure *message) {
     found |= gst_structure_has_name (message, "moirecalib/phase");
   };

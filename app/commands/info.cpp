@@ -39,8 +39,8 @@ public:
             "Shows the codec, size, rate, length and schedule of "
             "recordings, without decoding\nthem. A complete one has as many "
             "frames as were recorded, by its last line; a\nfinished one is "
-            "neither cut off nor damaged, but may be a part. With --json, a "
-            "list\nwith an object for each; one that is no recording has the "
+            "neither cut off nor damaged, but may be a part. With --json, a\n"
+            "list with an object for each; one that is no recording has the "
             "key \"error\". Exit\nstatus 1: one of them is none.\n",
         .examples = "  For people:\n"
                     "    codedexposure info coded.mkv\n"

@@ -48,18 +48,29 @@ StackSum::add (const SeenFrame &frame)
   times_ += frame.time - stack_.time;
   levels_ += level - level_;
   level_squares_ += (level - level_) * (level - level_);
-  each_pixel (frame.picture, [&] (int x, int y) {
-    const std::uint16_t value = frame.picture.at (x, y);
-    const float step = float (value) - float (first_.at (x, y));
-    sum_.at (x, y) += step;
-    squares_.at (x, y) += step * step;
-    products_.at (x, y) += step * more;
-    if (value == 0)
-      stack_.zeros.at (x, y)++;
-    if (value >= largest_)
-      stack_.full.at (x, y)++;
-    stack_.bits_seen |= value;
-  });
+  std::uint16_t bits = 0;
+  /* Loops of few kinds of values become vectors. */
+  for (int y = 0; y < height; y++) {
+    const std::uint16_t *value = frame.picture.view ().row (y);
+    const std::uint16_t *first = first_.view ().row (y);
+    float *sum = sum_.view ().row (y), *squares = squares_.view ().row (y);
+    float *products = products_.view ().row (y);
+    for (int x = 0; x < width; x++) {
+      const float step = float (value[x]) - float (first[x]);
+      sum[x] += step;
+      squares[x] += step * step;
+      products[x] += step * more;
+    }
+    std::uint8_t *zeros = stack_.zeros.view ().row (y);
+    std::uint8_t *full = stack_.full.view ().row (y);
+    for (int x = 0; x < width; x++) {
+      zeros[x] = std::uint8_t (zeros[x] + (value[x] == 0));
+      full[x] = std::uint8_t (full[x] + (value[x] >= largest_));
+    }
+    for (int x = 0; x < width; x++)
+      bits |= value[x];
+  }
+  stack_.bits_seen |= bits;
 }
 
 /* The mean of (step - mean step - (more - mean more) * weight) squared. */

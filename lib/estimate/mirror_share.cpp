@@ -20,23 +20,21 @@ EdgeLight
 edge_light (double x, double side, double sigma)
 {
   sigma = std::max (sigma, kMinSigma);
-  const auto below = [sigma] (double at) {
-    return 0.5 * std::erfc (-at / sigma / std::numbers::sqrt2);
-  };
-  const auto density = [sigma] (double at) {
-    const double z = at / sigma;
-    return std::exp (-0.5 * z * z) * std::numbers::inv_sqrtpi /
-           std::numbers::sqrt2 / sigma;
-  };
-  const double right = x + 0.5 * side, left = x - 0.5 * side;
   /* The second integral of the Gaussian, and its derivatives; by the heat
    * equation, that by the variance is half the second one. */
-  const auto ramp = [&] (double at) {
-    return at * below (at) + sigma * sigma * density (at);
+  struct Integrals {
+    double ramp, below, density;
   };
-  return {(ramp (right) - ramp (left)) / side,
-      (below (right) - below (left)) / side,
-      0.5 * (density (right) - density (left)) / side};
+  const auto at = [sigma] (double place) -> Integrals {
+    const double z = place / sigma;
+    const double below = 0.5 * std::erfc (-place / sigma / std::numbers::sqrt2);
+    const double density = std::exp (-0.5 * z * z) * std::numbers::inv_sqrtpi /
+                           std::numbers::sqrt2 / sigma;
+    return {place * below + sigma * sigma * density, below, density};
+  };
+  const Integrals right = at (x + 0.5 * side), left = at (x - 0.5 * side);
+  return {(right.ramp - left.ramp) / side, (right.below - left.below) / side,
+      0.5 * (right.density - left.density) / side};
 }
 
 double

@@ -3,17 +3,9 @@
 #pragma once
 
 #include <initializer_list>
+#include <span>
 #include <string_view>
 #include <vector>
-
-/** DO (target) for the instruction sets of a room in lib/meson.build, widest
- * first; its kernels are in the namespace ROOM_target.
- * @p narrow  the narrowest one on x86-64. */
-#if defined __x86_64__
-#define CODEDEXPOSURE_TARGETS(DO, narrow) DO (avx512) DO (avx2) DO (narrow)
-#else
-#define CODEDEXPOSURE_TARGETS(DO, narrow) DO (baseline)
-#endif
 
 namespace codedexposure
 {
@@ -37,3 +29,31 @@ supported (std::initializer_list<const Kernels *> all)
 }
 
 } // namespace codedexposure
+
+/** DO (room, Kernels, target) for the instruction sets of a room in
+ * lib/meson.build, widest first. @p narrow: the narrowest one on x86-64. */
+#if defined __x86_64__
+#define CODEDEXPOSURE_TARGETS(DO, room, Kernels, narrow)                       \
+  DO (room, Kernels, avx512)                                                   \
+  DO (room, Kernels, avx2) DO (room, Kernels, narrow)
+#else
+#define CODEDEXPOSURE_TARGETS(DO, room, Kernels, narrow)                       \
+  DO (room, Kernels, baseline)
+#endif
+#define CODEDEXPOSURE_DECLARE(room, Kernels, target)                           \
+  namespace room##_##target                                                    \
+  {                                                                            \
+    extern const Kernels kernels;                                              \
+  }
+#define CODEDEXPOSURE_ADDRESS(room, Kernels, target) &room##_##target::kernels,
+
+/** In namespace codedexposure, the definition of @p function, which gives the
+ * kernels of @p room that this processor can run, widest first. */
+#define CODEDEXPOSURE_SUPPORTED(function, room, Kernels, narrow)               \
+  CODEDEXPOSURE_TARGETS (CODEDEXPOSURE_DECLARE, room, Kernels, narrow)         \
+  std::span<const Kernels> function ()                                         \
+  {                                                                            \
+    static const auto found = supported<Kernels> ({CODEDEXPOSURE_TARGETS (     \
+        CODEDEXPOSURE_ADDRESS, room, Kernels, narrow)});                       \
+    return found;                                                              \
+  }

@@ -8,24 +8,11 @@
 #include "base/targets.h"
 #include "bench/kernels.h"
 
-#define CODEDEXPOSURE_KERNELS(target)                                          \
-  namespace codedexposure::bench_##target                                      \
-  {                                                                            \
-    extern const bench::Kernels kernels;                                       \
-  }
-CODEDEXPOSURE_TARGETS (CODEDEXPOSURE_KERNELS, baseline)
-
-std::span<const codedexposure::bench::Kernels>
-codedexposure::bench::supported_kernels ()
-{
-#define CODEDEXPOSURE_ADDRESS(target) &bench_##target::kernels,
-  static const auto kernels = supported<Kernels> (
-      {CODEDEXPOSURE_TARGETS (CODEDEXPOSURE_ADDRESS, baseline)});
-  return kernels;
-}
-
 namespace codedexposure
 {
+
+CODEDEXPOSURE_SUPPORTED (
+    bench::supported_kernels, bench, bench::Kernels, baseline)
 
 namespace
 {

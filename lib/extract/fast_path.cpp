@@ -13,21 +13,7 @@ namespace codedexposure
 {
 
 /* Plain x86-64 cannot permute bytes: the reference is as fast there. */
-#define CODEDEXPOSURE_KERNELS(target)                                          \
-  namespace extract_##target                                                   \
-  {                                                                            \
-    extern const Target kernels;                                               \
-  }
-CODEDEXPOSURE_TARGETS (CODEDEXPOSURE_KERNELS, sse4)
-
-std::span<const Target>
-supported_targets ()
-{
-#define CODEDEXPOSURE_ADDRESS(target) &extract_##target::kernels,
-  static const auto targets =
-      supported<Target> ({CODEDEXPOSURE_TARGETS (CODEDEXPOSURE_ADDRESS, sse4)});
-  return targets;
-}
+CODEDEXPOSURE_SUPPORTED (supported_targets, extract, Target, sse4)
 
 namespace
 {

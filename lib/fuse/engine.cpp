@@ -8,24 +8,15 @@
 #include "base/text.h"
 #include "base/try.h"
 
-#define CODEDEXPOSURE_KERNELS(target)                                          \
-  namespace codedexposure::fuse_##target                                       \
-  {                                                                            \
-    extern const fuse::Kernels kernels;                                        \
-  }
-CODEDEXPOSURE_TARGETS (CODEDEXPOSURE_KERNELS, baseline)
+namespace codedexposure
+{
+
+CODEDEXPOSURE_SUPPORTED (fuse::supported_kernels, fuse, fuse::Kernels, baseline)
+
+} // namespace codedexposure
 
 namespace codedexposure::fuse
 {
-
-std::span<const Kernels>
-supported_kernels ()
-{
-#define CODEDEXPOSURE_ADDRESS(target) &fuse_##target::kernels,
-  static const auto kernels = supported<Kernels> (
-      {CODEDEXPOSURE_TARGETS (CODEDEXPOSURE_ADDRESS, baseline)});
-  return kernels;
-}
 
 namespace
 {

@@ -19,24 +19,11 @@
 #include "rectify/filters.h"
 #include "rectify/sight.h"
 
-#define CODEDEXPOSURE_KERNELS(target)                                          \
-  namespace codedexposure::rectify_##target                                    \
-  {                                                                            \
-    extern const rectify::Kernels kernels;                                     \
-  }
-CODEDEXPOSURE_TARGETS (CODEDEXPOSURE_KERNELS, baseline)
-
-std::span<const codedexposure::rectify::Kernels>
-codedexposure::rectify::supported_kernels ()
-{
-#define CODEDEXPOSURE_ADDRESS(target) &rectify_##target::kernels,
-  static const auto kernels = supported<Kernels> (
-      {CODEDEXPOSURE_TARGETS (CODEDEXPOSURE_ADDRESS, baseline)});
-  return kernels;
-}
-
 namespace codedexposure
 {
+
+CODEDEXPOSURE_SUPPORTED (
+    rectify::supported_kernels, rectify, rectify::Kernels, baseline)
 
 using rectify::Place;
 

@@ -15,7 +15,7 @@ add_probe (GstPad *pad, int what, Probe probe)
 {
   return gst_pad_add_probe (
       pad, GstPadProbeType (what),
-      [] (GstPad *at, GstPadProbeInfo *info, gpointer call) {
+      [] (GstPad *at, GstPadProbeInfo *info, gpointer call) noexcept {
         return (*static_cast<Probe *> (call)) (at, info);
       },
       new Probe (std::move (probe)),

@@ -35,13 +35,15 @@ public:
     return {.name = "info",
         .summary = "show what a recording says of itself",
         .usage = "[option...] RECORDING.mkv...",
-        .description =
-            "Shows the codec, size, rate, length and schedule of "
-            "recordings, without decoding\nthem. A complete one has as many "
-            "frames as were recorded, by its last line; a\nfinished one is "
-            "neither cut off nor damaged, but may be a part. With --json, a\n"
-            "list with an object for each; one that is no recording has the "
-            "key \"error\". Exit\nstatus 1: one of them is none.\n",
+        .description = "Shows the codec, size, rate, length and schedule of "
+                       "recordings, without decoding\n"
+                       "them. One that is cut off is damaged, too; a complete "
+                       "one is not, and has as\n"
+                       "many frames as were recorded, by its last line. With "
+                       "--json, a list with an\n"
+                       "object for each; one that is no recording has the key "
+                       "\"error\". Exit status 1:\n"
+                       "one of them is none.\n",
         .examples = "  For people:\n"
                     "    codedexposure info coded.mkv\n"
                     "  All recordings of a day:\n"
@@ -78,11 +80,11 @@ public:
 private:
   Json describe (const std::string &path, const RecordingInfo &info) const
   {
-    const bool is_finished = !info.is_cut_short && !info.is_damaged;
+    const bool is_damaged = info.is_cut_short || info.is_damaged;
     Json json{{"recording", path}, {"codec", codec_text (info.head.codec)},
         {"size", size_text (info.head.size)}, {"frames", info.times.size ()},
-        {"finished", is_finished},
-        {"complete", is_finished && info.recorded == info.times.size ()},
+        {"damaged", is_damaged},
+        {"complete", !is_damaged && info.recorded == info.times.size ()},
         {"track", info.head.lines != 0}, {"period_ns", info.head.duration}};
     if (info.start)
       json["start_ns"] = *info.start;

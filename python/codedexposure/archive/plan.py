@@ -65,7 +65,7 @@ def recording_of(info, output, length):
     if 'error' in info:
         raise Problem(info['error'])
     times, whole = info['times_ns'], ''
-    if not info['finished']:
+    if info['damaged']:
         whole = 'it is cut off or damaged'
     elif not info['track']:
         whole = 'it has no track that numbers its frames'
@@ -100,7 +100,7 @@ def add_seconds(recordings, second):
         if 'error' in said:
             raise Problem(f'--second: {said["error"]}')
         recording.second_fingerprint = fingerprint(recording.second)
-        if not said['finished'] and not recording.whole:
+        if said['damaged'] and not recording.whole:
             recording.borders = []
             recording.whole = 'its second recording is cut off or damaged'
 

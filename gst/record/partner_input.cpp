@@ -218,6 +218,11 @@ PartnerInput::end (GstElement *element)
 {
   alone_.end (element);
   want (false);
+  std::unique_lock lock (lock_);
+  moved_.wait (lock, [&] {
+    return !gst_pad_is_linked (pad_) || has_ended_ || is_flushing_ ||
+           !may_wait_;
+  });
 }
 
 } // namespace codedexposure::gst

@@ -48,7 +48,8 @@ public:
       GstElement *element, GstBuffer *frame, bool wanted, bool encoded);
   /** After a flush. */
   void forget () { alone_.forget (); }
-  /** No frame of @p element follows. */
+  /** No frame of @p element follows. Waits for the end of the partners: what is
+   * said of them is said before the end of the stream. */
   void end (GstElement *element);
 
 private:

@@ -2,9 +2,11 @@
 /* Recordings of coded frames with partners: what comes out is what went in,
  * also where frames are alone, after seeks, and from damaged files. */
 #include <atomic>
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <iterator>
 #include <set>
 
@@ -283,6 +285,65 @@ TEST_F (RecordPairs, FramesAfterASeekHaveTheirs)
         live.partners.rbegin ()));
     EXPECT_GE (played.times.size (), kFrames - first - 1);
   }
+}
+
+/** Holds back the end of the second camera's frames until that of the coded
+ * frames comes, which should not. */
+struct HeldEnd {
+  std::promise<void> coded;
+  bool was_held = false, was_last = false;
+
+  void follow (const Pipeline &pipeline)
+  {
+    const auto added = [] (GstBin *, GstElement *part, gpointer self) {
+      if (std::string (G_OBJECT_TYPE_NAME (part)) == "GstCodedExposureRestore")
+        gst_pad_add_probe (pad_of (part, "sink").get (),
+            GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, hold, self, nullptr);
+    };
+    g_signal_connect (
+        pipeline["both"].get (), "element-added", G_CALLBACK (+added), this);
+    gst_pad_add_probe (
+        pipeline.pad ("out", "sink").get (),
+        GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
+        [] (GstPad *, GstPadProbeInfo *info, gpointer self) {
+          if (is_end (info))
+            static_cast<HeldEnd *> (self)->coded.set_value ();
+          return GST_PAD_PROBE_OK;
+        },
+        this, nullptr);
+  }
+
+private:
+  static bool is_end (GstPadProbeInfo *info)
+  {
+    return GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info)) == GST_EVENT_EOS;
+  }
+  static GstPadProbeReturn hold (GstPad *, GstPadProbeInfo *info, gpointer data)
+  {
+    constexpr std::chrono::milliseconds kLong (500);
+    auto &self = *static_cast<HeldEnd *> (data);
+    if (!is_end (info))
+      return GST_PAD_PROBE_OK;
+    self.was_held = true;
+    self.was_last =
+        self.coded.get_future ().wait_for (kLong) == std::future_status::ready;
+    return GST_PAD_PROBE_OK;
+  }
+};
+
+/* What is said of the second camera's frames is said before the end. */
+TEST_F (RecordPairs, TheEndFollowsThatOfTheSecondCamera)
+{
+  Seen live;
+  record (live);
+  Pipeline pipeline ("filesrc location=" + at ("both.mkv") +
+                     "! codedexposure-recorddemux name=both "
+                     "! fakesink name=out");
+  HeldEnd end;
+  end.follow (pipeline);
+  ASSERT_EQ (pipeline.play (), "");
+  EXPECT_TRUE (end.was_held);
+  EXPECT_FALSE (end.was_last);
 }
 
 /* A frame that waits for its partner when a flush comes is not alone. */

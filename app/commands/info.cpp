@@ -39,11 +39,11 @@ public:
                        "recordings, without decoding\n"
                        "them. One that is cut off is damaged, too; a complete "
                        "one is not, and has as\n"
-                       "many frames as were recorded, by its last line. With "
-                       "--json, a list with an\n"
-                       "object for each; one that is no recording has the key "
-                       "\"error\". Exit status 1:\n"
-                       "one of them is none.\n",
+                       "many frames, of each camera, as were recorded, by its "
+                       "last line. With --json,\n"
+                       "a list with an object for each; one that is no "
+                       "recording has the key \"error\".\n"
+                       "Exit status 1: one of them is none.\n",
         .examples = "  For people:\n"
                     "    codedexposure info coded.mkv\n"
                     "  All recordings of a day:\n"
@@ -78,13 +78,17 @@ public:
   }
 
 private:
+  static bool has_all (const RecordingInfo &info)
+  {
+    return info.recorded == info.times.size () &&
+           (!info.head.has_partners () || info.partners == *info.recorded);
+  }
   Json describe (const std::string &path, const RecordingInfo &info) const
   {
     const bool is_damaged = info.is_cut_short || info.is_damaged;
     Json json{{"recording", path}, {"codec", codec_text (info.head.codec)},
         {"size", size_text (info.head.size)}, {"frames", info.times.size ()},
-        {"damaged", is_damaged},
-        {"complete", !is_damaged && info.recorded == info.times.size ()},
+        {"damaged", is_damaged}, {"complete", !is_damaged && has_all (info)},
         {"track", info.head.lines != 0}, {"period_ns", info.head.duration}};
     if (info.start)
       json["start_ns"] = *info.start;
@@ -94,6 +98,8 @@ private:
     }
     if (info.recorded)
       json["recorded"] = *info.recorded;
+    if (info.head.has_partners ())
+      json["partners"] = info.partners;
     if (info.setup) {
       json["schedule"] = info.setup->schedule.text ();
       if (info.setup->rate)

@@ -238,6 +238,7 @@ read_block (Source &file, const Element &part, Walk &walk, RecordingInfo &info)
     info.start = block->time;
   if (block->track == info.head.video)
     info.times.push_back (block->time);
+  info.partners += block->track == info.head.partner_video;
   if (block->track != info.head.lines)
     return;
   walk.line = block->data, walk.line_end = part.end;

@@ -58,6 +58,9 @@ struct RecordingInfo {
   std::optional<Nanoseconds> start;
   /** PTS of the coded frames that are complete, in the order of the file. */
   std::vector<Nanoseconds> times;
+  /** Frames of the second camera that are complete; there is one, or one that
+   * stands in for it, of each coded frame. */
+  std::uint64_t partners = 0;
   /** Frames that were recorded, by the last line; none: it is missing. */
   std::optional<std::uint64_t> recorded;
   /** Of the first frame whose line says it; none: not known. */

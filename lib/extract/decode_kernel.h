@@ -9,256 +9,12 @@
 #include "base/vector.h"
 #include "extract/kernels.h"
 #include "extract/linear.h"
+#include "extract/numbers.h"
 #include "extract/select.h"
 #include "extract/split.h"
 
 namespace codedexposure::CODEDEXPOSURE_TARGET
 {
-
-/* Vectors of wider numbers have the order of the halves of 16 bytes, which
- * every instruction set unpacks and packs at once. */
-
-/** The lower (Half = 0) or upper halves of 16 bytes, with another vector's. */
-template <int Lanes, int Together, int Half>
-struct Unpack {
-  static constexpr int at (int lane)
-  {
-    const int within = lane % Together;
-    return lane - within + within / 2 + Half * Together / 2 +
-           within % 2 * Lanes;
-  }
-};
-
-/** Every second lane of 16 bytes of one vector and of another one. */
-template <int Lanes, int Together>
-struct Pack {
-  static constexpr int at (int lane)
-  {
-    const int within = lane % Together, half = Together / 2;
-    return lane - within + within % half * 2 + (within < half ? 0 : Lanes);
-  }
-};
-
-template <typename Wide, int Half, typename T>
-CODEDEXPOSURE_INLINE Vector<Wide>
-unpacked (Vector<T> v)
-{
-  return Vector<Wide> (
-      pick (v, Vector<T>{}, Unpack<kLanes<T>, 16 / int (sizeof (T)), Half> (),
-          std::make_integer_sequence<int, kLanes<T>> ()));
-}
-
-template <typename T, typename Wide>
-CODEDEXPOSURE_INLINE Vector<T>
-packed (Vector<Wide> low, Vector<Wide> high)
-{
-  return pick (Vector<T> (low), Vector<T> (high),
-      Pack<kLanes<T>, 16 / int (sizeof (T))> (),
-      std::make_integer_sequence<int, kLanes<T>> ());
-}
-
-template <typename Number>
-CODEDEXPOSURE_INLINE Vector<Number>
-clamped (Vector<Number> light, Number largest)
-{
-  return smaller (larger (light, Vector<Number>{}), largest + Vector<Number>{});
-}
-
-/** The same, clamped to 0..largest. */
-template <typename T, typename Wide>
-CODEDEXPOSURE_INLINE Vector<T>
-packed_clamped (Vector<Wide> low, Vector<Wide> high, T largest)
-{
-#if CODEDEXPOSURE_VECTOR_BYTES == 64
-  using Raw = __m512i;
-  constexpr auto pack = [] (Raw a, Raw b) CODEDEXPOSURE_INLINE_BODY {
-    return sizeof (T) == 1 ? _mm512_packus_epi16 (a, b)
-                           : _mm512_packus_epi32 (a, b);
-  };
-#elif CODEDEXPOSURE_VECTOR_BYTES == 32
-  using Raw = __m256i;
-  constexpr auto pack = [] (Raw a, Raw b) CODEDEXPOSURE_INLINE_BODY {
-    return sizeof (T) == 1 ? _mm256_packus_epi16 (a, b)
-                           : _mm256_packus_epi32 (a, b);
-  };
-#elif defined __SSE4_1__
-  using Raw = __m128i;
-  constexpr auto pack = [] (Raw a, Raw b) CODEDEXPOSURE_INLINE_BODY {
-    return sizeof (T) == 1 ? _mm_packus_epi16 (a, b) : _mm_packus_epi32 (a, b);
-  };
-#else
-  using Raw = Vector<Wide>;
-  constexpr auto pack = [] (Raw a, Raw b) CODEDEXPOSURE_INLINE_BODY {
-    constexpr Wide kMost = Wide (T (-1));
-    return packed<T, Wide> (clamped<Wide> (a, kMost), clamped<Wide> (b, kMost));
-  };
-#endif
-  return smaller (
-      Vector<T> (pack (Raw (low), Raw (high))), largest + Vector<T>{});
-}
-
-/** Cells of which the light is computed at a time. */
-template <typename Number>
-constexpr int kCells = 2 * kLanes<Number>;
-
-/** Numbers of so many cells. */
-template <typename V>
-struct Two {
-  V low, high;
-
-  CODEDEXPOSURE_INLINE static Two of (V both) { return {both, both}; }
-};
-
-/** The numbers of cells; values are not negative. */
-template <typename Number, typename From>
-CODEDEXPOSURE_INLINE Two<Vector<Number>>
-load_cells (const From *from)
-{
-  if constexpr (sizeof (Number) == 2 * sizeof (From)) {
-    const Vector<From> v = load (from);
-    return {unpacked<Number, 0, From> (v), unpacked<Number, 1, From> (v)};
-  } else {
-    Number numbers[kCells<Number>];
-    for (int i = 0; i < kCells<Number>; i++)
-      numbers[i] = Number (from[i]);
-    return {load (numbers), load (numbers + kLanes<Number>)};
-  }
-}
-
-/** The pixels of cells. */
-template <typename From, typename T, typename Number>
-CODEDEXPOSURE_INLINE void
-put_cells (
-    T *to, Two<Vector<Number>> light, T largest, [[maybe_unused]] Put put)
-{
-  if constexpr (sizeof (Number) == 2 * sizeof (From)) {
-    put (to, packed_clamped<T, Number> (light.low, light.high, largest));
-  } else {
-    Number numbers[kCells<Number>];
-    store (numbers, light.low);
-    store (numbers + kLanes<Number>, light.high);
-    for (int i = 0; i < kCells<Number>; i++) {
-      const Number low = numbers[i] < 0 ? 0 : numbers[i];
-      to[i] = T (int (low > largest ? largest : low));
-    }
-  }
-}
-
-/** Sums of whole numbers wrap around; only the last one has to fit. */
-template <typename Number>
-using Wrapping = Vector<std::make_unsigned_t<Number>>;
-
-/** Sums of whole multiples. */
-template <typename Number>
-struct Whole {
-  Two<Wrapping<Number>> sum;
-
-  CODEDEXPOSURE_INLINE explicit Whole (int start)
-      : sum (Two<Wrapping<Number>>::of (
-            std::make_unsigned_t<Number> (start) + Wrapping<Number>{}))
-  {
-  }
-  CODEDEXPOSURE_INLINE explicit Whole (const Number *from)
-      : sum{Wrapping<Number> (load (from)),
-            Wrapping<Number> (load (from + kLanes<Number>))}
-  {
-  }
-
-  CODEDEXPOSURE_INLINE Two<Vector<Number>> numbers () const
-  {
-    return {Vector<Number> (sum.low), Vector<Number> (sum.high)};
-  }
-
-  CODEDEXPOSURE_INLINE void add (int factor, Two<Vector<Number>> values)
-  {
-    const auto times = std::make_unsigned_t<Number> (factor);
-    if (factor == 1) [[likely]] {
-      sum.low += Wrapping<Number> (values.low);
-      sum.high += Wrapping<Number> (values.high);
-    } else if (factor != 0) {
-      sum.low += times * Wrapping<Number> (values.low);
-      sum.high += times * Wrapping<Number> (values.high);
-    }
-  }
-};
-
-/** Sums of fractions: floats, or numbers of 16 bits. */
-template <typename Number>
-struct Fractions {
-  using Part = float;
-
-  Two<Vector<Part>> sum;
-
-  CODEDEXPOSURE_INLINE explicit Fractions (const Linear &linear)
-      : sum (Two<Vector<Part>>::of (linear.start + Vector<Part>{}))
-  {
-  }
-  CODEDEXPOSURE_INLINE explicit Fractions (const Part *from)
-      : sum{load (from), load (from + kLanes<Part>)}
-  {
-  }
-
-  CODEDEXPOSURE_INLINE void add (
-      const LinearTerm &term, int, Two<Vector<Number>> values)
-  {
-    sum.low +=
-        term.fraction * __builtin_convertvector(values.low, Vector<float>);
-    sum.high +=
-        term.fraction * __builtin_convertvector(values.high, Vector<float>);
-  }
-
-  CODEDEXPOSURE_INLINE Two<Vector<Number>> rounded (const Linear &) const
-  {
-    return {rounded (sum.low), rounded (sum.high)};
-  }
-
-private:
-  /* A small float becomes one whose lower bits are it, rounded to nearest. */
-  CODEDEXPOSURE_INLINE static Vector<int> rounded (Vector<float> v)
-  {
-    return Vector<int> (v + 12582912.0f) - 0x4b400000; // 1.5 * 2^23
-  }
-};
-
-/** The upper halves of products. */
-CODEDEXPOSURE_INLINE Vector<short>
-high_product (Vector<short> values, short factor)
-{
-  short products[kLanes<short>];
-  store (products, values);
-  for (short &product : products)
-    product = short (int (product) * int (factor) >> 16);
-  return load (products);
-}
-
-template <>
-struct Fractions<short> {
-  using Part = std::uint16_t;
-
-  Two<Vector<Part>> sum;
-
-  CODEDEXPOSURE_INLINE explicit Fractions (const Linear &linear)
-      : sum (Two<Vector<Part>>::of (Part (linear.high_start) + Vector<Part>{}))
-  {
-  }
-  CODEDEXPOSURE_INLINE explicit Fractions (const Part *from)
-      : sum{load (from), load (from + kLanes<Part>)}
-  {
-  }
-
-  CODEDEXPOSURE_INLINE void add (
-      const LinearTerm &term, int up, Two<Vector<short>> values)
-  {
-    sum.low += Vector<Part> (high_product (values.low << up, term.high));
-    sum.high += Vector<Part> (high_product (values.high << up, term.high));
-  }
-
-  CODEDEXPOSURE_INLINE Two<Vector<short>> rounded (const Linear &linear) const
-  {
-    return {Vector<short> (sum.low) >> linear.down,
-        Vector<short> (sum.high) >> linear.down};
-  }
-};
 
 /** Calls body (at, put) for all cells, kCells at a time. */
 template <typename Number, typename Body>
@@ -366,10 +122,8 @@ decode_slot (const Linear &decoder, const LinearTerm *first, int count,
           }
           if constexpr (HasFractions)
             whole.add (1, rest.rounded (linear));
-          auto light = whole.numbers ();
-          if (linear.shift > 0)
-            light = {light.low >> linear.shift, light.high >> linear.shift};
-          put_cells<From, T, Number> (out + at, light, T (linear.largest), put);
+          put_cells<From, T, Number> (
+              out + at, light_of (whole, linear), T (linear.largest), put);
         });
     out = bytes_on (out, stride);
   }
@@ -448,11 +202,56 @@ decode_in (const Block<T> &block, const Layout<T> &layout, const Linear &linear,
       });
 }
 
+/** Kernels::decode of Linear::is_one_hot, where registers hold cells. */
+template <int Width, typename T>
+T
+decode_one_hot (const Block<T> &block, const Layout<T> &layout,
+    const Linear &decoder, const Planes<T> &to)
+{
+  using Number = NumberOf<T>;
+  constexpr int kN = Width * Width;
+  const Linear linear = decoder; // which pixels that are written cannot change
+  const LinearTerm term = linear.terms[0];
+  T *of_element[kN];
+  for (int s = 0; s < kN; s++)
+    of_element[linear.terms[s].value] = to.rows[s];
+  return for_squares<Width, T> (block, layout,
+      {of_element, to.stride, to.stream},
+      [&] (const auto &parts, auto put) CODEDEXPOSURE_INLINE_BODY {
+        Whole<Number> all (0);
+#pragma GCC unroll 16
+        for (int p = 0; p < kN; p++)
+          all.add (1, numbers_of<Number, T> (parts[p / Width][p % Width]));
+        Fractions<Number> start (linear);
+        start.add (linear.common, linear.sum_up, all.numbers ());
+#pragma GCC unroll 16
+        for (int p = 0; p < kN; p++) {
+          const auto numbers =
+              numbers_of<Number, T> (parts[p / Width][p % Width]);
+          Whole<Number> whole (0);
+          whole.add (term.whole, numbers);
+          auto rest = start;
+          rest.add (term, linear.up, numbers);
+          whole.add (1, rest.rounded (linear));
+          const auto light = light_of (whole, linear);
+          put (p, packed_clamped<T, Number> (
+                      light.low, light.high, T (linear.largest)));
+        }
+      });
+}
+
 /** One element less another one, times a factor. */
 template <typename T>
 struct Difference {
   Vector<T> most, limit;
   std::uint16_t factor;
+
+  CODEDEXPOSURE_INLINE explicit Difference (const Linear &linear)
+      : most (T (linear.largest) + Vector<T>{}),
+        limit (T (linear.largest / linear.terms[0].whole) + Vector<T>{}),
+        factor (std::uint16_t (linear.terms[0].whole))
+  {
+  }
 
   CODEDEXPOSURE_INLINE Vector<T> operator() (
       Vector<T> element, Vector<T> before) const
@@ -466,33 +265,45 @@ struct Difference {
 };
 
 /** Kernels::decode where slot k is element k less the one before, and every
- * element is at the place of its own number; Height 0: any. */
-template <int Width, typename T, int Height = 0>
+ * element is at the place of its own number; registers hold cells. */
+template <int Width, typename T>
+T
+decode_square_differences (const Block<T> &block, const Layout<T> &layout,
+    const Linear &linear, const Planes<T> &to)
+{
+  const Difference<T> difference (linear);
+  return for_squares<Width, T> (block, layout, to,
+      [&] (const auto &parts, auto put) CODEDEXPOSURE_INLINE_BODY {
+        Vector<T> before = {};
+#pragma GCC unroll 16
+        for (int p = 0; p < Width * Width; p++) {
+          const Vector<T> part = parts[p / Width][p % Width];
+          put (p, difference (part, before));
+          before = part;
+        }
+      });
+}
+
+/** The same for other cells. */
+template <int Width, typename T>
 T
 decode_differences (
     const Block<T> &block, const Linear &linear, const Planes<T> &to)
 {
-  /* Registers hold small cells as a whole. */
-  if constexpr (Height == 0 && Width <= 4)
-    if (block.height == Width)
-      return decode_differences<Width, T, Width> (block, linear, to);
-  const int height = Height > 0 ? Height : block.height;
-  const int factor = linear.terms[0].whole;
-  const Difference<T> difference = {T (linear.largest) + Vector<T>{},
-      T (linear.largest / factor) + Vector<T>{}, std::uint16_t (factor)};
+  const Difference<T> difference (linear);
   Vector<T> most = {};
-  T *out[Height > 0 ? Width * Height : 256];
+  T *out[256];
   for (int j = 0; j < block.rows; j++) {
-    for (int k = 0; k < Width * height; k++)
+    for (int k = 0; k < Width * block.height; k++)
       out[k] = bytes_on (to.rows[k], j * to.stride);
     for_strips<T> (block.cells, to.stream,
         [&] (int at, Put put) CODEDEXPOSURE_INLINE_BODY {
           Vector<T> before = {};
           const T *row = bytes_on (block.pixels + at * Width,
-              std::ptrdiff_t (j) * height * block.stride);
-          const auto split = [&] (int y) CODEDEXPOSURE_INLINE_BODY {
-            prefetch (
-                bytes_on (row, height * block.stride), Width * kVectorBytes);
+              std::ptrdiff_t (j) * block.height * block.stride);
+          for (int y = 0; y < block.height; y++) {
+            prefetch (bytes_on (row, block.height * block.stride),
+                Width * kVectorBytes);
             Vector<T> parts[Width];
             split_cells<Width, T> (row, parts);
 #pragma GCC unroll 16
@@ -502,14 +313,6 @@ decode_differences (
               most = larger (most, before);
             }
             row = bytes_on (row, block.stride);
-          };
-          if constexpr (Height > 0) {
-#pragma GCC unroll 4
-            for (int y = 0; y < Height; y++)
-              split (y);
-          } else {
-            for (int y = 0; y < height; y++)
-              split (y);
           }
         });
   }
@@ -566,9 +369,23 @@ decode (const Block<T> &block, const Layout<T> &layout, const Linear &linear,
       return &decode_differences<Width, T>;
     return nullptr;
   };
-  if (linear.is_staircase && layout.identity)
+  constexpr auto square_differences = []<int Width> () {
+    return &decode_square_differences<Width, T>;
+  };
+  constexpr auto one_hot = []<int Width> () {
+    return &decode_one_hot<Width, T>;
+  };
+  if (linear.is_staircase && layout.identity) {
+    if (const auto run = for_square<square_differences> (block))
+      return run (block, layout, linear, to);
     if (const auto run = for_width<differences> (block.width))
       return run (block, linear, to);
+  }
+  constexpr Numbers kNumbers =
+      sizeof (T) == 1 ? Numbers::kShort : Numbers::kInt;
+  if (linear.is_one_hot && linear.numbers == kNumbers && layout.repeat == 1)
+    if (const auto run = for_square<one_hot> (block))
+      return run (block, layout, linear, to);
   if constexpr (sizeof (T) == 1)
     if (linear.numbers == Numbers::kShort)
       return decode_in<T, short> (block, layout, linear, to);

@@ -114,6 +114,7 @@ LinearPlan::LinearPlan (const Decoder &decoder, int white, int largest)
     ends_ = its_ends;
     linear_.has_common = false;
   }
+  linear_.is_one_hot = has_one_each ();
   linear_.terms = terms_.data ();
   linear_.ends = ends_.data ();
 }
@@ -199,6 +200,26 @@ LinearPlan::has_steps () const
     const LinearTerm &less = terms_[std::size_t (s > 0 ? 2 * s - 1 : 0)];
     if (!has_step || (s > 0 && (less.value != s - 1 || less.whole != -factor)))
       return false;
+  }
+  return true;
+}
+
+/** Linear::is_one_hot. */
+bool
+LinearPlan::has_one_each () const
+{
+  if (!linear_.has_common || !linear_.has_fractions ||
+      terms_.size () != ends_.size ())
+    return false;
+  std::vector<bool> seen (ends_.size ());
+  for (std::size_t s = 0; s < ends_.size (); s++) {
+    const LinearTerm &term = terms_[s], &first = terms_[0];
+    const bool is_same = term.whole == first.whole &&
+                         term.fraction == first.fraction &&
+                         term.high == first.high;
+    if (!is_same || ends_[s] != int (s + 1) || seen[std::size_t (term.value)])
+      return false;
+    seen[std::size_t (term.value)] = true;
   }
   return true;
 }

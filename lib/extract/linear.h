@@ -52,6 +52,9 @@ struct Linear {
   /** Slot k is element k less element k - 1, times a whole factor that is the
    * same for all. */
   bool is_staircase = false;
+  /** Each slot is an element of its own, times a factor that is the same for
+   * all, and the common sum. */
+  bool is_one_hot = false;
   LinearTerm common = {};
   const LinearTerm *terms = nullptr; ///< of one slot after the other
   const int *ends = nullptr;         ///< of the terms of each slot
@@ -79,6 +82,7 @@ private:
   void take_common ();
   void split_factors (int shift);
   bool has_steps () const;
+  bool has_one_each () const;
   bool fits (double most, double limit, double white) const;
   bool take_high_products (double most);
 

@@ -27,12 +27,77 @@ for_width (int width)
       width, std::make_integer_sequence<int, kOwnWidths + 1> ());
 }
 
+/** What Own gives for cells of as many rows as columns, if registers hold them
+ * as a whole; null: they do not. */
+template <auto Own, typename T>
+auto
+for_square (const Block<T> &block)
+{
+  return block.width != block.height ? nullptr
+         : block.width == 2          ? Own.template operator()<2> ()
+         : block.width == 3          ? Own.template operator()<3> ()
+         : block.width == 4          ? Own.template operator()<4> ()
+                                     : nullptr;
+}
+
+/** Calls body (parts, put) for every vector of such cells, where elements stand
+ * at one place throughout a row; parts[y][x] are the pixels of a place of them,
+ * and put (p, v) writes what place p gives. All pixels of cells are read before
+ * anything is written. Returns the largest pixel. */
+template <int Width, typename T, typename Body>
+CODEDEXPOSURE_INLINE T
+for_squares (const Block<T> &block, const Layout<T> &layout,
+    const Planes<T> &to, Body body)
+{
+  constexpr int kN = Width * Width;
+  Vector<T> most = {};
+  T *out[kN];
+  for (int j = 0; j < block.rows; j++) {
+    const std::uint8_t *element =
+        layout.element + (j + layout.row) % layout.rows * kN;
+    for (int p = 0; p < kN; p++)
+      out[p] = bytes_on (to.rows[element[p]], j * to.stride);
+    for_strips<T> (block.cells, to.stream,
+        [&] (int at, Put put) CODEDEXPOSURE_INLINE_BODY {
+          const T *row = bytes_on (block.pixels + at * Width,
+              std::ptrdiff_t (j) * Width * block.stride);
+          Vector<T> parts[Width][Width];
+#pragma GCC unroll 4
+          for (auto &of_row : parts) {
+            prefetch (
+                bytes_on (row, Width * block.stride), Width * kVectorBytes);
+            split_cells<Width, T> (row, of_row);
+            row = bytes_on (row, block.stride);
+#pragma GCC unroll 4
+            for (const Vector<T> part : of_row)
+              most = larger (most, part);
+          }
+          body (parts, [&] (int p, Vector<T> v)
+                           CODEDEXPOSURE_INLINE_BODY { put (out[p] + at, v); });
+        });
+  }
+  return largest_lane<T> (most);
+}
+
+/** Kernels::select of such cells. */
+template <int Width, typename T>
+T
+select_squares (
+    const Block<T> &block, const Layout<T> &layout, const Planes<T> &to)
+{
+  return for_squares<Width, T> (block, layout, to,
+      [&] (const auto &parts, auto put) CODEDEXPOSURE_INLINE_BODY {
+#pragma GCC unroll 16
+        for (int p = 0; p < Width * Width; p++)
+          put (p, parts[p / Width][p % Width]);
+      });
+}
+
 /** Kernels::select where elements stand at one place throughout a row. All
  * cells of a row are worked on before the next row of their pixels, so that
  * only as many subframes are written at a time: many more than a hundred would
- * be more pages than the TLB of the processor holds. Together rows of a cell
- * are worked on at a time. */
-template <int Width, typename T, int Together = 1>
+ * be more pages than the TLB of the processor holds. */
+template <int Width, typename T>
 T
 select_rows (
     const Block<T> &block, const Layout<T> &layout, const Planes<T> &to)
@@ -40,23 +105,21 @@ select_rows (
   const int width = Width > 0 ? Width : block.width;
   Vector<T> most = {};
   T *out[256];
-  for (int y = 0; y < block.height; y += Together) {
+  for (int y = 0; y < block.height; y++) {
     int repeat_row = layout.row;
     for (int j = 0; j < block.rows; j++) {
       const std::uint8_t *element =
           layout.element + repeat_row * layout.n + y * width;
-      for (int p = 0; p < Together * width; p++)
+      for (int p = 0; p < width; p++)
         out[p] = bytes_on (to.rows[element[p]], j * to.stride);
       repeat_row = repeat_row + 1 < layout.rows ? repeat_row + 1 : 0;
       const T *row = bytes_on (
           block.pixels, (std::ptrdiff_t (j) * block.height + y) * block.stride);
       for_strips<T> (block.cells, to.stream,
           [&] (int at, Put put) CODEDEXPOSURE_INLINE_BODY {
-            for (int i = 0; i < Together; i++)
-              most = larger (most,
-                  split_row<Width, T> (
-                      bytes_on (row, i * block.stride) + at * width, width,
-                      out + i * width, at, put, block.height * block.stride));
+            most =
+                larger (most, split_row<Width, T> (row + at * width, width, out,
+                                  at, put, block.height * block.stride));
           });
     }
   }
@@ -125,9 +188,10 @@ select (const Block<T> &block, const Layout<T> &layout, const Planes<T> &to)
 {
   if (layout.repeat > 1)
     return select_relabelled (block, layout, to);
-  /* The work on a row of so few pixels is less than what leads up to it. */
-  if (block.width == 2 && block.height == 2)
-    return select_rows<2, T, 2> (block, layout, to);
+  if (const auto run =
+          for_square<[]<int Width> () { return &select_squares<Width, T>; }> (
+              block))
+    return run (block, layout, to);
   return for_width<[]<int Width> () { return &select_rows<Width, T>; }> (
       block.width) (block, layout, to);
 }

@@ -237,10 +237,11 @@ TEST (Extract, LeakageIsDecodedInWholeNumbersAndFloats)
           "sequential:4x4,leak=0.001", "sequential:4x4,leak=0.02"}) {
     SCOPED_TRACE (text);
     const auto decoder = Decoder::make (preset (text), 0.0, true);
-    EXPECT_EQ (
-        LinearPlan (*decoder, 255, 255).linear ().numbers, Numbers::kShort);
-    EXPECT_EQ (
-        LinearPlan (*decoder, 65535, 4095).linear ().numbers, Numbers::kInt);
+    const LinearPlan bytes (*decoder, 255, 255), words (*decoder, 65535, 4095);
+    EXPECT_EQ (bytes.linear ().numbers, Numbers::kShort);
+    EXPECT_EQ (words.linear ().numbers, Numbers::kInt);
+    EXPECT_TRUE (bytes.linear ().is_one_hot);
+    EXPECT_TRUE (words.linear ().is_one_hot);
   }
 }
 

@@ -261,6 +261,12 @@ TYPED_TEST (Kernels, EqualTheReferenceOnEveryTileAndMethod)
       {"sequential:2x2,leak=0.3", {.method = Method::kDecode}},
       {"sequential:16x16,leak=0.0001", {.method = Method::kDecode}},
       {"sequential:lattice:8/3,leak=0.001", {.method = Method::kDecode}},
+      {"sequential:2x2,phase=1/1,leak=0.05", {.method = Method::kDecode}},
+      {"sequential:3x3,order=bit-reversal,leak=0.01",
+          {.method = Method::kDecode}},
+      {"sequential:4x4,phase=3/2,leak=0.02", {.method = Method::kDecode}},
+      {"sequential:5x5,leak=0.001", {.method = Method::kDecode}},
+      {"sequential:4x2,leak=0.001", {.method = Method::kDecode}},
       {"s-matrix:4x4", {.method = Method::kDecode}},
       {"s-matrix:7x1", {.method = Method::kDecode}},
       {"staircase:2x2", {.method = Method::kRank}},
@@ -289,6 +295,8 @@ TYPED_TEST (Kernels, EqualTheReferenceAtEveryWidth)
       {"staircase:5x4", {.method = Method::kDecode, .interpolate = false}},
       {"s-matrix:2x2", {.method = Method::kDecode}},
       {"sequential:2x2,leak=0.001", {.method = Method::kDecode}},
+      {"sequential:3x3,leak=0.001", {.method = Method::kDecode}},
+      {"sequential:4x4,leak=0.001", {.method = Method::kDecode}},
       {"staircase:3x3", {.method = Method::kRank}},
       {"staircase:5x5", {.method = Method::kRank}},
   };
@@ -337,6 +345,9 @@ TYPED_TEST (Kernels, EqualTheReferenceOnFramesThatBypassTheCaches)
       contents ()[0], 1301, rows);
   expect_equal<TypeParam> (
       {"staircase:4x4", {.method = Method::kDecode, .interpolate = false}},
+      contents ()[0], 601, 900 / int (sizeof (TypeParam)));
+  expect_equal<TypeParam> (
+      {"sequential:4x4,leak=0.001", {.method = Method::kDecode}},
       contents ()[0], 601, 900 / int (sizeof (TypeParam)));
 }
 

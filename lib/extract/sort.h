@@ -80,6 +80,27 @@ rank_of (const Block<T> &block, const Layout<T> &layout, const Planes<T> &to)
       });
 }
 
+/** Kernels::rank where registers hold cells. */
+template <int Width, typename T>
+T
+rank_squares (
+    const Block<T> &block, const Layout<T> &layout, const Planes<T> &to)
+{
+  constexpr int kN = Width * Width;
+  return for_squares<Width, T> (block, layout, to,
+      [&] (const auto &parts, auto put) CODEDEXPOSURE_INLINE_BODY {
+        Vector<T> wires[kN];
+#pragma GCC unroll 16
+        for (int p = 0; p < kN; p++)
+          wires[p] = parts[p / Width][p % Width];
+        sort_wires<kN> (
+            wires, std::make_integer_sequence<int, kComparators<kN>.size> ());
+#pragma GCC unroll 16
+        for (int p = 0; p < kN; p++)
+          put (p, wires[p]);
+      });
+}
+
 template <typename T, int... N>
 T
 rank_of (const Block<T> &block, const Layout<T> &layout, const Planes<T> &to,
@@ -106,9 +127,14 @@ template <typename T>
 T
 rank (const Block<T> &block, const Layout<T> &layout, const Planes<T> &to)
 {
-  return rank_of (block,
-      Layout<T>{nullptr, layout.n, 1, 1, 0, 0, nullptr, true, kIdentity.at}, to,
-      std::make_integer_sequence<int, kStraight + 1> ());
+  const Layout<T> raster{
+      nullptr, layout.n, 1, 1, 0, 0, nullptr, true, kIdentity.at};
+  if (const auto run =
+          for_square<[]<int Width> () { return &rank_squares<Width, T>; }> (
+              block))
+    return run (block, raster, to);
+  return rank_of (
+      block, raster, to, std::make_integer_sequence<int, kStraight + 1> ());
 }
 
 } // namespace codedexposure::CODEDEXPOSURE_TARGET

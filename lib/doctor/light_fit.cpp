@@ -26,6 +26,11 @@ constexpr double kOutlier = 6.0, kOtherMask = 1.0 / 64.0;
 /** Squares that a line must explain, in those of noise: there are many thousand
  * frequencies to choose from. */
 constexpr double kSurprise = 80.0;
+/** Jitter, in periods, that is larger leaves some frames whole of runs that the
+ * exposure cuts. */
+constexpr double kAlike = 1.0 / 256.0;
+/** Exposures that differ by less, in periods, do not tell what leaks. */
+constexpr double kLonger = 0.1;
 constexpr double kTiny = 1e-12;                      // DN^2
 constexpr int kLines = 2;                            // at most
 constexpr double kSlowest = 0.15, kFastest = 1200.0; // Hz
@@ -54,9 +59,11 @@ private:
     return model.match (samples_, {weights_.data (), samples_.size ()});
   }
   void scan_window ();
+  void find_leak ();
   VectorXd residuals (const LightModel &model) const;
   Minimum solve (bool moves);
   double used () const { return double ((weights_.array () > 0.0).count ()); }
+  bool is_cut (const LightSample &sample) const;
   void weigh ();
   /** Of what the frames of each run have in common, and of each frame. */
   struct Squares {
@@ -159,6 +166,20 @@ Fit::scan_window ()
   }
 }
 
+/** Mirrors that are off pass more light in a longer exposure; jitter hides by
+ * how much. */
+void
+Fit::find_leak ()
+{
+  if (model_.lengths.size () < 2)
+    return;
+  const double longer = model_.lengths[1] - model_.lengths[0];
+  const double more = model_.offsets[1] - model_.offsets[0];
+  if (longer > kLonger * model_.period && model_.gain > 0.0 &&
+      jitter ().value < kAlike * model_.period)
+    model_.leak = std::clamp (more / (model_.gain * longer), 0.0, 1.0);
+}
+
 VectorXd
 Fit::residuals (const LightModel &model) const
 {
@@ -195,15 +216,27 @@ Fit::solve (bool moves)
   return found;
 }
 
+/** Whether the light of @p sample depends on when the exposure begins. */
+bool
+Fit::is_cut (const LightSample &sample) const
+{
+  const double step = 1e-7 * model_.period;
+  LightModel later = model_;
+  later.start += step;
+  const double change = later.light (sample) - model_.light (sample);
+  return std::abs (change) > 0.9 * model_.gain * step;
+}
+
 /** Frames of a run that scatter more than usual, or whose common error may be
- * larger, have less weight. A frame that differs from the others of its run by
- * far, such as one of another mask, has none. */
+ * larger, have less weight. Jitter scatters all runs that the exposure cuts
+ * alike, and the few frames of one tell it badly. A frame that differs from the
+ * others of its run by far, such as one of another mask, has none. */
 void
 Fit::weigh ()
 {
   weights_.setOnes ();
   const VectorXd r = residuals (model_);
-  std::vector<double> middles, spreads, all;
+  std::vector<double> middles, spreads, all, cut;
   for (const auto &run : runs_) {
     std::vector<double> values, aside;
     for (const Index i : run)
@@ -212,15 +245,21 @@ Fit::weigh ()
     for (const double value : values)
       aside.push_back (1.4826 * std::abs (value - middles.back ()));
     all.insert (all.end (), aside.begin (), aside.end ());
+    if (is_cut (samples_[std::size_t (run.front ())]))
+      cut.insert (cut.end (), aside.begin (), aside.end ());
     spreads.push_back (median (aside));
   }
   const double usual = std::max (median (all), 1e-9);
+  double of_cut = cut.empty () ? 0.0 : median (cut);
+  if (of_cut > kAlike * model_.period * model_.gain)
+    of_cut = 0.0;
   const double far = kOtherMask * model_.period * model_.gain;
   for (std::size_t k = 0; k < runs_.size (); k++)
     for (const Index i : runs_[k]) {
-      const double spread = std::max (usual, spreads[k]);
-      const double doubt = samples_[std::size_t (i)].doubt *
-                           std::sqrt (double (runs_[k].size ()));
+      const LightSample &sample = samples_[std::size_t (i)];
+      const double spread =
+          std::max ({usual, spreads[k], is_cut (sample) ? of_cut : 0.0});
+      const double doubt = sample.doubt * std::sqrt (double (runs_[k].size ()));
       weights_[i] =
           std::abs (r[i] - middles[k]) <= std::max (kOutlier * spread, far)
               ? usual / std::hypot (spread, doubt)
@@ -253,10 +292,17 @@ Fit::add_line (std::vector<Position> *spectrum)
   LineSearch search;
   for (std::size_t i = 0; i < samples_.size (); i++) {
     const double weight = weights_[Index (i)], time = samples_[i].time;
-    if (weight > 0.0)
-      each_lit_time (model_, samples_[i], [&] (double from, double until) {
-        search.lit.push_back ({int (i), weight, time + from, time + until});
-      });
+    if (weight > 0.0) {
+      const auto add = [&] (double part, double from, double until) {
+        search.lit.push_back (
+            {int (i), part * weight, time + from, time + until});
+      };
+      each_lit_time (model_, samples_[i],
+          [&] (double from, double until) { add (1.0, from, until); });
+      if (model_.leak > 0.0)
+        add (model_.leak, model_.start,
+            model_.start + model_.lengths[std::size_t (samples_[i].exposure)]);
+    }
   }
   const Minimum before = solve (false);
   search.residual = before.residuals / model_.gain;
@@ -328,8 +374,6 @@ Fit::covariance (const Minimum &found) const
 Measured
 Fit::jitter () const
 {
-  LightModel later = model_;
-  later.start += 1e-7 * model_.period;
   struct Variance {
     double free = 0.0, squares = 0.0;
     double value () const { return squares / free; }
@@ -337,20 +381,19 @@ Fit::jitter () const
   } cut, whole;
   for (const auto &run : runs_) {
     double frames = 0.0, sum = 0.0, squares = 0.0;
-    bool is_cut = false;
+    bool cuts = false;
     for (const Index i : run) {
       const LightSample &sample = samples_[std::size_t (i)];
-      const double light = model_.light (sample);
-      const double seconds = (sample.light - light) / model_.gain;
+      const double seconds =
+          (sample.light - model_.light (sample)) / model_.gain;
       if (weights_[i] == 0.0)
         continue;
       frames += 1.0;
       sum += seconds;
       squares += seconds * seconds;
-      is_cut = std::abs (later.light (sample) - light) >
-               0.9 * model_.gain * (later.start - model_.start);
+      cuts = is_cut (sample);
     }
-    Variance &of = is_cut ? cut : whole;
+    Variance &of = cuts ? cut : whole;
     of.free += std::max (0.0, frames - 1.0);
     of.squares += squares - sum * sum / std::max (1.0, frames);
   }
@@ -404,6 +447,7 @@ Fit::run ()
   match (model_);
   scan_window ();
   solve (true);
+  find_leak ();
   weigh ();
   for (int line = 0; line < kLines; line++) {
     if (!add_line (line == 0 ? &fit.spectrum : nullptr))
@@ -411,6 +455,7 @@ Fit::run ()
     weigh ();
     scan_window ();
     solve (true);
+    find_leak ();
   }
   weigh ();
   solve (true);

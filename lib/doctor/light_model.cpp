@@ -15,23 +15,33 @@ LightLine::depth () const
 }
 
 double
+LightModel::seconds_of (double from, double until) const
+{
+  const double half = 0.5 * (until - from), middle = from + half;
+  double even = 1.0 + drift * middle;
+  for (const LightLine &line : lines) {
+    const double turn = 2.0 * std::numbers::pi * line.frequency;
+    const double damp =
+        turn * half > 1e-9 ? std::sin (turn * half) / (turn * half) : 1.0;
+    even += damp * (line.cosine * std::cos (turn * middle) +
+                       line.sine * std::sin (turn * middle));
+  }
+  return 2.0 * half * even;
+}
+
+double
 LightModel::light (const LightSample &sample) const
 {
+  const auto exposure = std::size_t (sample.exposure);
   double seconds = 0.0;
   each_lit_time (*this, sample, [&] (double from, double until) {
-    const double half = 0.5 * (until - from);
-    const double middle = sample.time + from + half;
-    double even = 1.0 + drift * middle;
-    for (const LightLine &line : lines) {
-      const double turn = 2.0 * std::numbers::pi * line.frequency;
-      const double damp =
-          turn * half > 1e-9 ? std::sin (turn * half) / (turn * half) : 1.0;
-      even += damp * (line.cosine * std::cos (turn * middle) +
-                         line.sine * std::sin (turn * middle));
-    }
-    seconds += 2.0 * half * even;
+    seconds += seconds_of (sample.time + from, sample.time + until);
   });
-  return offsets[std::size_t (sample.exposure)] + gain * seconds;
+  if (leak > 0.0) {
+    const double begin = sample.time + start, length = lengths[exposure];
+    seconds += leak * (seconds_of (begin, begin + length) - length);
+  }
+  return offsets[exposure] + gain * seconds;
 }
 
 double

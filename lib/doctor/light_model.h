@@ -22,6 +22,8 @@ struct LightSample {
   /** Samples with another exposure time, or of another part of the range, have
    * another number: 0, 1, ... */
   int exposure = 0;
+  /** Standard deviation of the mean that the noise of its pixels makes, DN. */
+  double noise = 0.0;
 };
 
 /** A periodic part of the light. */
@@ -38,6 +40,9 @@ struct LightModel {
   double gain = 0.0;   ///< DN for a second of light
   double drift = 0.0;  ///< growth of the light a second, as a part of it
   double start = 0.0;  ///< of every exposure, s after its trigger
+  /** Light of mirrors that are off, as a part of what they add when on. Its
+   * mean is in the offsets. */
+  double leak = 0.0;
   std::vector<double> lengths = {}; ///< of the exposures, s
   std::vector<double> offsets = {}; ///< DN without light in them
   std::vector<LightLine> lines = {};
@@ -45,6 +50,8 @@ struct LightModel {
   /** DN of a frame; its time counts from the epoch of the lines and of the
    * drift. */
   double light (const LightSample &sample) const;
+  /** Seconds of the mean light in [@p from, @p until), after the epoch. */
+  double seconds_of (double from, double until) const;
   /**
    * Sets the gain and the offsets that explain @p samples best, and returns the
    * squares that remain.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/statistics.h"
+#include "doctor/line_search.h"
 #include "doctor/runs.h"
 #include "estimate/least_squares.h"
 
@@ -39,6 +40,10 @@ constexpr double kFaster = 2.5;
 /* The same of runs that are a third as long: pulses give both the same light.
  */
 constexpr double kFasterThird = 1.4;
+
+/* Weak flicker: its depth, which no check complains about, and frequencies, Hz;
+ * and the part of the squares that a fit with it leaves at most. */
+constexpr double kWeak = 0.01, kSlowest = 0.5, kFastest = 1200.0, kLeft = 0.1;
 
 /** In 0..1, evenly spread. */
 double
@@ -74,7 +79,8 @@ change_of_runs (Examination &examination, int grid, int slots)
   for (const LightSample &sample : runs.samples) {
     lights.push_back (sample.light - black);
     sum += lights.back ();
-    squares += lights.back () * lights.back ();
+    squares += lights.back () * lights.back () - sample.doubt * sample.doubt -
+               sample.noise * sample.noise;
   }
   const double count = std::max (1.0, double (lights.size ()));
   const double mean = std::max (sum / count, 1e-3);
@@ -110,16 +116,24 @@ public:
 
   void add (const Runs &runs);
   /** Squares that are left of those of add () number @p first to @p last, the
-   * mean, without what rounding explains. None if there are too few. */
-  std::optional<double> rest (int first, int last) const;
+   * mean, without what rounding and noise explain; the sigma is that of the
+   * noise. None if there are too few. */
+  std::optional<Measured> rest (int first, int last) const;
+  /** Adds weak flicker that the check of the trigger has not seen. */
+  void find_flicker ();
 
 private:
   struct Part {
     int runs = 0; // number of its add ()
     LightSample sample;
-    double light = 0.0, doubt = 0.0; // by the mean
+    double light = 0.0, doubt = 0.0, noise = 0.0; // by the mean
+  };
+  /** What the fit leaves of each part, and what is flicker in it. */
+  struct Fitted {
+    Eigen::VectorXd rest, flicker;
   };
   Eigen::MatrixXd rows () const;
+  Fitted solve (const Eigen::MatrixXd &rows) const;
 
   const LightFit &light_;
   std::vector<double> frequencies_;
@@ -138,7 +152,7 @@ RunFit::add (const Runs &runs)
   for (const LightSample &sample : runs.samples)
     if (mean > 0.0)
       parts_.push_back ({added_, sample, (sample.light - offset) / mean,
-          sample.doubt / mean});
+          sample.doubt / mean, sample.noise / mean});
   added_++;
 }
 
@@ -149,26 +163,56 @@ RunFit::rows () const
 {
   using std::numbers::pi;
   const auto columns = Eigen::Index (frequencies_.size ());
+  /* Mirrors that are off pass light in all of the exposure. */
+  const LightModel &model = light_.model;
+  const double length = model.lengths.back ();
+  const double leaks = model.leak * length;
   Eigen::MatrixXd rows = Eigen::MatrixXd::Zero (
       Eigen::Index (parts_.size ()), added_ + 2 * columns);
   for (std::size_t i = 0; i < parts_.size (); i++) {
-    const auto &[runs, sample, light, doubt] = parts_[i];
+    const auto &[runs, sample, light, doubt, noise] = parts_[i];
     const auto row = Eigen::Index (i);
     rows (row, runs) = 1.0;
     for (Eigen::Index k = 0; k < columns; k++) {
       const double turns = 2.0 * pi * frequencies_[std::size_t (k)];
-      const double half = 0.5 * turns * (sample.until - sample.from);
-      const double middle = turns * (sample.time - light_.epoch +
-                                        0.5 * (sample.from + sample.until));
-      rows (row, added_ + 2 * k) = std::cos (middle) * std::sin (half) / half;
-      rows (row, added_ + 2 * k + 1) =
-          std::sin (middle) * std::sin (half) / half;
+      const auto add = [&] (double part, double from, double until) {
+        const double half = 0.5 * turns * (until - from);
+        const double middle =
+            turns * (sample.time - light_.epoch + 0.5 * (from + until));
+        rows (row, added_ + 2 * k) +=
+            part * std::cos (middle) * std::sin (half) / half;
+        rows (row, added_ + 2 * k + 1) +=
+            part * std::sin (middle) * std::sin (half) / half;
+      };
+      add (1.0, sample.from, sample.until);
+      add (leaks / (sample.until - sample.from), model.start,
+          model.start + length);
     }
   }
   return rows;
 }
 
-std::optional<double>
+RunFit::Fitted
+RunFit::solve (const Eigen::MatrixXd &rows) const
+{
+  Fitted fitted;
+  Eigen::VectorXd light (rows.rows ());
+  for (std::size_t i = 0; i < parts_.size (); i++)
+    light[Eigen::Index (i)] = parts_[i].light;
+  /* Few runs under strong flicker have another mean than all light has. */
+  for (int round = 0; round < kRounds; round++) {
+    const Eigen::VectorXd found =
+        solve_normal (normal_of (rows), rows.transpose () * light);
+    fitted.rest = light - rows * found;
+    fitted.flicker = rows.rightCols (rows.cols () - added_) *
+                     found.tail (rows.cols () - added_);
+    for (std::size_t i = 0; i < parts_.size (); i++)
+      light[Eigen::Index (i)] /= found[parts_[i].runs];
+  }
+  return fitted;
+}
+
+std::optional<Measured>
 RunFit::rest (int first, int last) const
 {
   const Eigen::MatrixXd rows = this->rows ();
@@ -176,30 +220,50 @@ RunFit::rest (int first, int last) const
   const double free = looks - double (rows.cols ());
   if (free < 3.0)
     return std::nullopt;
-  Eigen::VectorXd light (rows.rows ()), rest, flicker;
-  for (std::size_t i = 0; i < parts_.size (); i++)
-    light[Eigen::Index (i)] = parts_[i].light;
-  /* Few runs under strong flicker have another mean than all light has. */
-  for (int round = 0; round < kRounds; round++) {
-    const Eigen::VectorXd found =
-        solve_normal (normal_of (rows), rows.transpose () * light);
-    rest = light - rows * found;
-    flicker = rows.rightCols (rows.cols () - added_) *
-              found.tail (rows.cols () - added_);
-    for (std::size_t i = 0; i < parts_.size (); i++)
-      light[Eigen::Index (i)] /= found[parts_[i].runs];
-  }
-  double squares = 0.0, count = 0.0;
+  const auto [rest, flicker] = solve (rows);
+  /* Frames of a look have their own noise, of which the fit takes less away
+   * than of what they share. */
+  const double unshared =
+      (1.0 - double (rows.cols ()) / double (parts_.size ())) * looks / free;
+  double squares = 0.0, noises = 0.0, count = 0.0;
   for (std::size_t i = 0; i < parts_.size (); i++) {
-    const auto &[runs, sample, value, doubt] = parts_[i];
+    const auto &[runs, sample, value, doubt, noise] = parts_[i];
     if (runs < first || runs > last)
       continue;
     const double left = rest[Eigen::Index (i)];
     squares += left * left * looks / free - doubt * doubt -
                std::pow (kUnlike * flicker[Eigen::Index (i)], 2);
+    noises += unshared * noise * noise;
     count++;
   }
-  return std::max (0.0, squares / std::max (1.0, count));
+  count = std::max (1.0, count);
+  return Measured{std::max (0.0, (squares - noises) / count),
+      noises / count * std::sqrt (2.0 / count)};
+}
+
+/* A line that is found by chance leaves much of the light of pulses. */
+void
+RunFit::find_flicker ()
+{
+  const auto before = rest (0, added_ - 1);
+  if (!before)
+    return;
+  LineSearch search;
+  search.others = rows ();
+  search.residual = solve (search.others).rest;
+  for (std::size_t i = 0; i < parts_.size (); i++) {
+    const LightSample &sample = parts_[i].sample;
+    const double time = sample.time - light_.epoch;
+    search.lit.push_back ({int (i), 1.0 / (sample.until - sample.from),
+        time + sample.from, time + sample.until});
+  }
+  const LightLine line = search.strongest (kSlowest, kFastest);
+  if (line.depth () > kWeak)
+    return;
+  frequencies_.push_back (line.frequency);
+  const auto after = rest (0, added_ - 1);
+  if (!after || after->value > kLeft * before->value)
+    frequencies_.pop_back ();
 }
 
 /** Adds runs of @p slots slots at some places that lie in the exposure. */
@@ -260,15 +324,23 @@ measure_pulses (Examination &examination)
   Runs runs (examination, int (kSlots * period / longest));
   RETURN_IF_ERROR (see_runs (runs, light->model, period, runs.grid () / 4));
   fit.add (runs);
+  fit.find_flicker ();
   constexpr int kShorter = int (std::size (kLengths));
   const auto shorter = fit.rest (0, kShorter - 1);
   const auto longer = fit.rest (kShorter, kShorter);
   if (!shorter || !longer)
     return kNotMeasured;
-  const double rms = *shorter > kFasterThird * kFasterThird * *longer
-                         ? length * std::sqrt (*shorter - *longer)
-                         : 0.0;
-  return Measured{rms, rms / std::sqrt (2.0 * kShorter * kPlaces)};
+  const double faster = shorter->value - longer->value;
+  const double square =
+      shorter->value > kFasterThird * kFasterThird * longer->value ? faster
+                                                                   : 0.0;
+  const double looks = kShorter * kPlaces;
+  const double doubt = std::hypot (
+      square * std::sqrt (2.0 / looks), shorter->sigma, longer->sigma);
+  const double rms = std::sqrt (square);
+  return scaled (
+      {rms, std::min (std::sqrt (doubt), doubt / std::max (2.0 * rms, 1e-12))},
+      length);
 }
 
 } // namespace codedexposure

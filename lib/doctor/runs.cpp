@@ -23,9 +23,12 @@ Runs::see (const StillMask &mask, int exposure, int frames)
     bits_seen |= level.bits_seen;
     const int step = bits_seen ? bits_seen & -bits_seen : 1; // DN
     borders.push_back (border_light (frame.picture.view ()));
+    const double pixels =
+        double (frame.picture.width ()) * frame.picture.height ();
     samples.push_back ({1e-9 * double (frame.time), mask.first * slot (),
         (mask.first + mask.slots) * slot (), level.mean,
-        rounding_doubt (level.noise, step), exposure});
+        rounding_doubt (level.noise, step), exposure,
+        level.noise / std::sqrt (std::max (1.0, pixels))});
   });
   return came ? Result<void> () : came.error ();
 }

@@ -142,22 +142,55 @@ judge_noise (const Correlations &noise, Finding &finding)
             share (before));
 }
 
+/* The @p good pixels that are not near a spot of others: light around dust
+ * falls off. Where little remains, it is no dust that is everywhere. */
+Image<std::uint8_t>
+away_from_spots (ImageView<const std::uint8_t> good)
+{
+  constexpr int kNear = 6;
+  constexpr double kEnough = 0.3;
+  Image<std::uint8_t> all (good.width, good.height), away = all;
+  double before = 0.0, after = 0.0;
+  each_pixel (all, [&] (int x, int y) {
+    all.at (x, y) = away.at (x, y) = good.at (x, y);
+    before += good.at (x, y) != 0;
+  });
+  each_pixel (all, [&] (int x, int y) {
+    bool spot = true, border = false;
+    each_near (
+        all, {x, y}, 1, [&] (int i, int j) { spot &= all.at (i, j) == 0; });
+    if (!spot)
+      return;
+    each_near (
+        all, {x, y}, 2, [&] (int i, int j) { border |= all.at (i, j) != 0; });
+    if (border)
+      each_near (
+          away, {x, y}, kNear, [&] (int i, int j) { away.at (i, j) = 0; });
+  });
+  each_pixel (away, [&] (int x, int y) { after += away.at (x, y) != 0; });
+  return after > kEnough * before ? std::move (away) : std::move (all);
+}
+
 /* What neighbours two pixels apart have in common beyond the light around them,
  * as a part of the light: no noise, and not the pixels' own sensitivity. */
 double
-texture_of (const Image<float> &light, ImageView<const std::uint8_t> good)
+texture_of (const Image<float> &whole, ImageView<const std::uint8_t> defects)
 {
-  const int width = light.width (), height = light.height ();
-  const Image<float> even = smooth (light);
+  const int width = whole.width (), height = whole.height ();
+  const Image<std::uint8_t> seen = away_from_spots (defects);
+  const auto good = std::as_const (seen).view ();
+  const Image<float> around = smooth (whole);
   /* Where the light ends nearby, what is even is not known. */
   const auto ends = [&] (int x, int y) {
-    float least = even.at (x, y);
+    float least = around.at (x, y);
     for (const int i : {-kReach, kReach})
       for (const int j : {-kReach, kReach})
-        least = std::min (least, even.at (std::clamp (x + i, 0, width - 1),
+        least = std::min (least, around.at (std::clamp (x + i, 0, width - 1),
                                      std::clamp (y + j, 0, height - 1)));
-    return least < kEnds * even.at (x, y);
+    return least < kEnds * around.at (x, y);
   };
+  const Image<float> light = flattened (whole, good);
+  const Image<float> even = smooth (light, good);
   Image<float> rest (width, height);
   each_pixel (rest, [&] (int x, int y) {
     if (good.at (x, y) != 0 && !ends (x, y))

@@ -108,8 +108,12 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int kColumns = 24, kRows = 18, kFewBlocks = 30;
-/* Of the median: a block that is darker sees no mirrors. */
-constexpr double kNoMirrors = 0.1;
+/* A block with less than this part of the light of bright ones, which few are
+ * brighter than, sees no mirrors. */
+constexpr double kNoMirrors = 0.1, kBright = 0.9;
+/* A place further from all blocks that see mirrors, as a part of the frame, is
+ * not known. */
+constexpr double kFar = 1.0 / 6.0;
 constexpr double kOutlier = 5.0;
 /* Side of the blocks whose medians are the light without defects, pixels. */
 constexpr int kSide = 24;
@@ -143,10 +147,68 @@ blocks_of (ImageView<const float> picture)
   return blocks;
 }
 
+/** Pixels of @p block that are @p good, or of more than it where these are
+ * few. */
+std::vector<float>
+good_values (const Image<float> &image, const Rect &block,
+    ImageView<const std::uint8_t> good)
+{
+  const auto enough =
+      std::size_t (block.width) * std::size_t (block.height) / 4;
+  std::vector<float> values;
+  for (int more = 0; more <= std::max (image.width (), image.height ());
+       more += kSide / 2) {
+    values.clear ();
+    const int right = std::min (block.x + block.width + more, image.width ());
+    const int below = std::min (block.y + block.height + more, image.height ());
+    for (int y = std::max (block.y - more, 0); y < below; y++)
+      for (int x = std::max (block.x - more, 0); x < right; x++)
+        if (good.width == 0 || good.at (x, y) != 0)
+          values.push_back (image.at (x, y));
+    if (values.size () >= enough)
+      return values;
+  }
+  return values.empty () ? std::vector{0.0f} : values;
+}
+
 } // namespace
 
 Image<float>
-smooth (const Image<float> &image)
+flattened (const Image<float> &light, ImageView<const std::uint8_t> good)
+{
+  constexpr int kPlaces = 128;    // in a row, at which the surface is fitted
+  constexpr double kLeast = 0.05; // of its light, where there is none
+  const int width = light.width (), height = light.height ();
+  const auto terms_at = [&] (int x, int y) {
+    return terms ((2 * x + 1.0) / width - 1.0, (2 * y + 1.0) / height - 1.0);
+  };
+  const int step = std::max (1, width / kPlaces);
+  MatrixXd normal = MatrixXd::Zero (7, 7);
+  VectorXd right = VectorXd::Zero (7);
+  double sum = 0.0, count = 0.0;
+  for (int y = 0; y < height; y += step)
+    for (int x = 0; x < width; x += step)
+      if (good.at (x, y) != 0) {
+        const Eigen::RowVectorXd row = terms_at (x, y);
+        normal += row.transpose () * row;
+        right += double (light.at (x, y)) * row.transpose ();
+        sum += double (light.at (x, y));
+        count++;
+      }
+  if (count < kFewBlocks)
+    return light;
+  const VectorXd surface = inverse_of (normal) * right;
+  const double least = std::max (kLeast * sum / count, 1e-3);
+  Image<float> flat (width, height);
+  each_pixel (flat, [&] (int x, int y) {
+    flat.at (x, y) = light.at (x, y) /
+                     float (std::max (least, terms_at (x, y).dot (surface)));
+  });
+  return flat;
+}
+
+Image<float>
+smooth (const Image<float> &image, ImageView<const std::uint8_t> good)
 {
   const int columns = std::max (1, image.width () / kSide);
   const int rows = std::max (1, image.height () / kSide);
@@ -154,11 +216,10 @@ smooth (const Image<float> &image)
   const double high = double (image.height ()) / rows;
   Image<float> medians (columns, rows);
   each_pixel (medians, [&] (int i, int j) {
-    std::vector<float> values;
-    for (int y = int (j * high); y < int ((j + 1) * high); y++)
-      for (int x = int (i * wide); x < int ((i + 1) * wide); x++)
-        values.push_back (image.at (x, y));
-    medians.at (i, j) = median (std::move (values));
+    const Rect block{int (i * wide), int (j * high),
+        int ((i + 1) * wide) - int (i * wide),
+        int ((j + 1) * high) - int (j * high)};
+    medians.at (i, j) = median (good_values (image, block, good));
   });
   const auto place = [] (double at, int count) {
     const int low =
@@ -186,7 +247,7 @@ corner_loss (ImageView<const float> picture)
   std::vector<float> lights;
   each_pixel (
       blocks, [&] (int i, int j) { lights.push_back (blocks.at (i, j)); });
-  const float dark = float (kNoMirrors) * median (lights);
+  const float dark = float (kNoMirrors) * quantile (lights, kBright);
   MatrixXd a (Index (lights.size ()), 7);
   VectorXd b (a.rows ()), weights = VectorXd::Ones (a.rows ());
   each_pixel (blocks, [&] (int i, int j) {
@@ -221,14 +282,25 @@ corner_loss (ImageView<const float> picture)
   }
   if (!(surface[0] > 0.0))
     return {kUnknown, kUnknown};
-  Measured loss{-1.0, 0.0};
+  const auto is_seen = [&] (double u, double v) {
+    bool seen = false;
+    for (Index i = 0; i < a.rows (); i++)
+      seen |= weights[i] > 0.0 && std::max (std::abs (a (i, 1) - u),
+                                      std::abs (a (i, 2) - v)) < 2.0 * kFar;
+    return seen;
+  };
+  Measured loss{kUnknown, kUnknown};
+  if (!is_seen (0.0, 0.0))
+    return loss;
   for (const double u : {-1.0, 1.0})
     for (const double v : {-1.0, 1.0}) {
       const Eigen::RowVectorXd corner = terms (u, v);
-      const double part = 1.0 - corner.dot (surface) / surface[0];
-      if (part > loss.value)
-        loss = {part,
-            noise * std::sqrt (corner.dot (corner * inverse)) / surface[0]};
+      const double left = corner.dot (surface) / surface[0];
+      if (!is_seen (u, v) || 1.0 - left < loss.value)
+        continue;
+      const Eigen::RowVectorXd slope =
+          (corner - left * terms (0.0, 0.0)) / surface[0];
+      loss = {1.0 - left, noise * std::sqrt (slope.dot (slope * inverse))};
     }
   return loss;
 }

@@ -50,7 +50,14 @@ BorderLight border_light (ImageView<const std::uint16_t> picture);
 Measured corner_loss (ImageView<const float> picture);
 
 /** @p image without what is smaller than some ten pixels, such as defects: the
- * medians of blocks, bilinear between their centres and beyond them. */
-Image<float> smooth (const Image<float> &image);
+ * medians of blocks, bilinear between their centres and beyond them. @p good:
+ * pixels that count; none: all. */
+Image<float> smooth (
+    const Image<float> &image, ImageView<const std::uint8_t> good = {});
+
+/** @p light by the surface of fourth order that fits its @p good pixels: light
+ * that falls off is even then, without steps between blocks. */
+Image<float> flattened (
+    const Image<float> &light, ImageView<const std::uint8_t> good);
 
 } // namespace codedexposure

@@ -18,10 +18,11 @@ namespace
 
 constexpr int kChanges = 12, kFramesOfChange = 10;
 constexpr int kTiles = 8;
-/* Levels of one mask differ less, as parts of the step to the other one: to
- * tell which mask it is, though the light flickers; and to tell that a frame is
- * of one mask alone. */
-constexpr double kSameMask = 0.45, kSameLevel = 0.2;
+/* A frame is of the brighter mask above this part of the step to it: light that
+ * flickers changes a bright frame by more than a dark one. */
+constexpr double kBrighter = 0.3;
+/* Levels of frames of one mask alone differ less, as parts of the step. */
+constexpr double kSameLevel = 0.2;
 /* Light of all mirrors by which a run of an eighth can be measured, part of the
  * range. */
 constexpr double kFaint = 0.05;
@@ -96,11 +97,13 @@ LagCheck::judge (const std::vector<SeenFrame> &seen, double before,
   Change change{.old = int (pause)};
   int late = 0;
   bool turned = false;
+  const double between =
+      std::min (before, after) + kBrighter * std::abs (before - after);
   for (std::size_t i = pause; i < seen.size (); i++) {
     const double mean = level_of (seen[i].picture.view (), largest_).mean;
     const double off =
         std::abs (mean - after) / std::max (1e-9, std::abs (before - after));
-    const bool is_old = off > kSameMask;
+    const bool is_old = (mean > between) == (before > after);
     // A frame that was cut short lies between the masks, and is not new.
     if (off > kSameLevel)
       change.old = int (i) + 1;

@@ -52,6 +52,9 @@ constexpr double kEarly = 100;
 /* An exposure that is longer, or known less well, is none that explains the
  * light; parts of the period. */
 constexpr double kLongest = 1.5, kUnclear = 0.02;
+/* A line that is that deep and explains little: something else changes the
+ * light of runs, and may make the exposure look wrong. */
+constexpr double kUnexplained = 0.1;
 /* Jitter that is known no better is large, us. */
 constexpr double kScattered = 60;
 /* Mirrors that are late make the exposure look early, s. */
@@ -455,7 +458,10 @@ TriggerCheck::diagnose_exposure (const LightFit &fit)
   finding_.add ("exposure", length);
   finding_.add (kEnd, end);
   finding_.add ("jitter", jitter);
-  if (verdict_of ("jitter", jitter) >= Verdict::warn) {
+  const bool wrong = std::max (verdict_of ("delay", start),
+                         verdict_of (kEnd, end)) >= Verdict::warn;
+  if (verdict_of ("jitter", jitter) >= Verdict::warn ||
+      (wrong && fit.faintest > kUnexplained && jitter.sigma < kScattered)) {
     ASSIGN_OR_RETURN (const bool blamed, blame_light ());
     if (blamed)
       return {};

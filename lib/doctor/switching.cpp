@@ -5,6 +5,7 @@
 #include <cmath>
 #include <iterator>
 #include <numbers>
+#include <utility>
 
 #include "base/statistics.h"
 #include "base/try.h"
@@ -31,13 +32,16 @@ constexpr Nanoseconds kFirst = -1'500'000;
 /* Of the moments at which mirrors go off, from the end of the exposure on. */
 constexpr Nanoseconds kMoments[] = {-2'500'000, -1'500'000, -1'000'000,
     -700'000, -500'000, -350'000, -250'000, -175'000, -125'000, -75'000,
-    -25'000, 25'000, 75'000, 150'000, 300'000, 600'000, 1'100'000, 1'600'000};
+    -25'000, 0, 25'000, 75'000, 150'000, 300'000, 600'000, 1'100'000,
+    1'600'000};
 /* Error of the light of a point, relative: flicker and drift. */
 constexpr double kLightError = 0.0002;
+/* The same of flicker, relative to it: jitter and its own form. */
+constexpr double kFlickerError = 0.02;
 /* By how much flicker and a bent response change the slope in a ms. */
 constexpr double kCurvature = 0.02;
 /* Moments about the end of the exposure. */
-constexpr Nanoseconds kAboutFrom = -150'000, kAboutUntil = 400'000;
+constexpr Nanoseconds kAboutFrom = -100'000, kAboutUntil = 100'000;
 constexpr double kLongest = 4e-3; // transition that points can show, s
 
 /* Light, in seconds, of mirrors that go off at @time, within @took, seen until
@@ -202,13 +206,19 @@ see_point (Examination &examination, const Examination::Lit &run, double end,
                 (1e-9 * double (stack.time) - examination.light->epoch)
           : 0.0;
   const double slot = 1e-9 * period / run.of;
-  const double off = slot * (run.first + run.slots);
+  const double from = slot * run.first, off = slot * (run.first + run.slots);
+  std::vector<double> flicker = flicker_of (examination,
+      1e-9 * double (stack.time), from, std::min (off, 1e-9 * end), frames);
+  double changed = 0.0; // s, squared
+  for (const double part : flicker)
+    changed += part * part;
+  const double unlike = kFlickerError * (means.mean - black) *
+                        std::sqrt (changed) / std::max (slot, off - from);
   return SwitchPoint{off, black + (means.mean - black) / (1.0 + grown),
-      std::hypot (std::hypot (rounding, kLightError * means.mean),
-          stack.scatter / std::sqrt (frames)),
-      slot * run.first,
-      flicker_of (examination, 1e-9 * double (stack.time), slot * run.first,
-          std::min (off, 1e-9 * end), frames)};
+      std::hypot (std::hypot (rounding, unlike),
+          std::hypot (
+              kLightError * means.mean, stack.scatter / std::sqrt (frames))),
+      from, std::move (flicker)};
 }
 
 /* The points of all moments; @run begins with its slot, and somewhat earlier

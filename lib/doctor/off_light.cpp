@@ -18,8 +18,9 @@ namespace
  * much time after the light of the pedestal. */
 constexpr int kShorter = 5;
 constexpr double kAfterPedestal = 50e3; // ns
-/* Change of the light from look to look, DN, above which there are some. */
-constexpr double kUnsteady = 0.02;
+/* Change of the light from look to look, DN, above which there are some; less
+ * is 0.02 % of the light that the mirrors pass when they are on. */
+constexpr double kUnsteady = 0.025;
 constexpr int kRounds = 3;
 /* Variance of the noise with which rounding can be undone, DN squared. */
 constexpr double kEnough = 0.16;

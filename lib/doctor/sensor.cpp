@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <numbers>
 
 #include "base/try.h"
 #include "doctor/defects.h"
@@ -95,6 +96,7 @@ private:
   bool evaluate ();
   void report ();
   void diagnose ();
+  void diagnose_black ();
   void diagnose_defects (
       const char *id, const char *what, const std::vector<Offset> &pixels);
   void plot ();
@@ -374,6 +376,37 @@ PhotonTransferRun::diagnose_defects (
         count > kDefectsFail * all ? Verdict::fail : Verdict::warn);
 }
 
+/* Light of mirrors that are off may lift all pixels from 0; without it, noise
+ * is cut off all the same. */
+void
+PhotonTransferRun::diagnose_black ()
+{
+  constexpr const char *kId = "black-clipped";
+  constexpr double kQuiet = 0.05; // noise, DN
+  const double zeros = std::max (off_.shorter.zeros, dark_means_.zeros);
+  const Measured seen = {100.0 * zeros, 0.0};
+  if (transfer_ && missing_bits () == 0 &&
+      verdict_of (kId, seen) < Verdict::warn) {
+    const double gain = transfer_->conversion_gain.value;
+    const Measured noise = scaled (transfer_->read_noise, 1.0 / gain);
+    const double sigma = std::max (kQuiet, noise.value);
+    const double below = (0.5 - black_.value) / sigma;
+    const double density =
+        std::exp (-0.5 * below * below) / std::sqrt (2.0 * std::numbers::pi);
+    const Measured part = {0.5 * std::erfc (-below / std::numbers::sqrt2),
+        density * std::hypot (black_.sigma, below * noise.sigma) / sigma};
+    if (verdict_of (kId, scaled (part, 100.0)) >= Verdict::warn) {
+      finding_.judge (kId, scaled (part, 100.0),
+          "the black level is " + fixed (black_.value, 1) +
+              " DN: without light that leaks past the mirrors, " +
+              fixed (100.0 * part.value, 0) +
+              " % of the dark pixel values are 0, where noise is cut off");
+      return;
+    }
+  }
+  finding_.judge (kId, seen);
+}
+
 void
 PhotonTransferRun::diagnose ()
 {
@@ -383,8 +416,7 @@ PhotonTransferRun::diagnose ()
     finding_.blame ("missing-bits", "the lowest " + std::to_string (missing) +
                                         " of " + std::to_string (bits) +
                                         " bits are always 0");
-  const double zeros = std::max (off_.shorter.zeros, dark_means_.zeros);
-  finding_.judge ("black-clipped", {100.0 * zeros, 0.0});
+  diagnose_black ();
   const bool known = !finding_.is_ill ();
   const double light = signal (levels_.back ().means) / largest_;
   if (transfer_ && known) {

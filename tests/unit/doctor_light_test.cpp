@@ -212,11 +212,9 @@ INSTANTIATE_TEST_SUITE_P (Single, Faults,
         Case{"frame-late-varies", " frame-late-varies "},
         Case{"jitter", " jitter "}, Case{"jitter=500us", " jitter "},
         Case{"jitter=3ms", " jitter "}, Case{"jitter=8ms", " jitter "},
-        Case{"missing-bits=3", " missing-bits "},
-        Case{"missing-bits=4", " missing-bits "},
-        Case{"missing-bits=6", " missing-bits "}, Case{"dark", " dark "},
-        Case{"dark=0.1", " dark "}, Case{"bright", " bright "},
-        Case{"bright=5", " bright "}, Case{"vignetting", " vignetting "},
+        Case{"dark", " dark "}, Case{"dark=0.1", " dark "},
+        Case{"bright", " bright "}, Case{"bright=5", " bright "},
+        Case{"vignetting", " vignetting "},
         Case{"vignetting=0.45", " vignetting "}, Case{"drift", " drift "},
         Case{"drift=-0.2", " drift "}, Case{"drift=0.3", " drift "},
         Case{"flicker", " flicker "}, Case{"flicker=120:0.03", " flicker "},
@@ -263,6 +261,46 @@ INSTANTIATE_TEST_SUITE_P (OfOtherChecks, OtherFaults,
         Case{"rotation", ""}, Case{"scale", ""}, Case{"shift", ""},
         Case{"dust", ""}, Case{"lose", ""}, Case{"slip", ""},
         Case{"frame-jitter", ""}));
+
+/* Steps that are as large a part of the range as those of 8 bits without the
+ * lowest ones hide the exposure. */
+TEST (StepFaults, AreNamedFirst)
+{
+  constexpr int kMost = 8; // that a simulated camera can lack
+  for (const int missing : {3, 4, 6})
+    for (std::uint64_t seed = 1; seed <= std::uint64_t (effort ()); seed++) {
+      const SickBenchOptions options = bench (seed);
+      const std::string words =
+          "missing-bits=" +
+          std::to_string (std::min (kMost, missing + options.bits - 8));
+      EXPECT_EQ (visit (options, words).first (), "missing-bits")
+          << words << " seed " << seed;
+    }
+}
+
+/* 12 bits without a few have steps that are finer than those of 8 bits, or
+ * little coarser. */
+TEST (StepFaults, AreLeftToTheSensorWhereTheyAreFine)
+{
+  for (const char *words :
+      {"missing-bits=3", "missing-bits=4", "missing-bits=6"})
+    for (std::uint64_t seed = 3; seed <= std::uint64_t (3 * effort ());
+         seed += 3) {
+      SickBenchOptions options = bench (seed);
+      ASSERT_EQ (options.bits, 12);
+      EXPECT_EQ (visit (options, words).first (), "") << words;
+      ASSERT_TRUE (inflict (options, words));
+      auto rig = SimulatedRig::make (options);
+      ASSERT_TRUE (rig);
+      Examination examination{**rig};
+      examination.exhibits = false;
+      ASSERT_TRUE (check_trigger (examination));
+      const auto sensor = check_sensor (examination);
+      ASSERT_TRUE (sensor);
+      ASSERT_FALSE (sensor->diagnoses.empty ());
+      EXPECT_EQ (sensor->diagnoses.front ().id, "missing-bits") << words;
+    }
+}
 
 TEST (Jitter, IsNamedWhereAllFramesScatter)
 {

@@ -121,11 +121,12 @@ constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN ();
 
 /** A surface of second order, and of fourth along the radius; u and v are -1
  * and 1 at the borders. */
-Eigen::RowVectorXd
+using Terms = Eigen::Matrix<double, 1, 7>;
+Terms
 terms (double u, double v)
 {
   const double square = u * u + v * v;
-  return Eigen::RowVectorXd{{1.0, u, v, u * u, u * v, v * v, square * square}};
+  return {1.0, u, v, u * u, u * v, v * v, square * square};
 }
 
 /** Medians of blocks. */
@@ -147,17 +148,17 @@ blocks_of (ImageView<const float> picture)
   return blocks;
 }
 
-/** Pixels of @p block that are @p good, or of more than it where these are
+/** Pixels of @p block that are @p good, and of those around it where these are
  * few. */
 std::vector<float>
 good_values (const Image<float> &image, const Rect &block,
     ImageView<const std::uint8_t> good)
 {
+  constexpr int kAround = 4 * kSide;
   const auto enough =
       std::size_t (block.width) * std::size_t (block.height) / 4;
   std::vector<float> values;
-  for (int more = 0; more <= std::max (image.width (), image.height ());
-       more += kSide / 2) {
+  for (int more = 0; more <= kAround; more += kSide / 2) {
     values.clear ();
     const int right = std::min (block.x + block.width + more, image.width ());
     const int below = std::min (block.y + block.height + more, image.height ());
@@ -189,7 +190,7 @@ flattened (const Image<float> &light, ImageView<const std::uint8_t> good)
   for (int y = 0; y < height; y += step)
     for (int x = 0; x < width; x += step)
       if (good.at (x, y) != 0) {
-        const Eigen::RowVectorXd row = terms_at (x, y);
+        const Terms row = terms_at (x, y);
         normal += row.transpose () * row;
         right += double (light.at (x, y)) * row.transpose ();
         sum += double (light.at (x, y));
@@ -294,12 +295,11 @@ corner_loss (ImageView<const float> picture)
     return loss;
   for (const double u : {-1.0, 1.0})
     for (const double v : {-1.0, 1.0}) {
-      const Eigen::RowVectorXd corner = terms (u, v);
+      const Terms corner = terms (u, v);
       const double left = corner.dot (surface) / surface[0];
       if (!is_seen (u, v) || 1.0 - left < loss.value)
         continue;
-      const Eigen::RowVectorXd slope =
-          (corner - left * terms (0.0, 0.0)) / surface[0];
+      const Terms slope = (corner - left * terms (0.0, 0.0)) / surface[0];
       loss = {1.0 - left, noise * std::sqrt (slope.dot (slope * inverse))};
     }
   return loss;

@@ -8,13 +8,11 @@
 #include <gst/video/video.h>
 
 #include "common/element.h"
+#include "partner_input.h"
 #include "parts.h"
 
 namespace codedexposure::gst
 {
-
-/* In the queue of frames. */
-static constexpr guint kFrames = 8;
 
 /* ----------------------------------------------------------- raw frames -- */
 
@@ -214,8 +212,8 @@ CameraTracks::add_frames (GstPad *pad, const FrameReading &how)
   if (!make_decoder (pad, caps.get (), how))
     return;
   queue_ = gst_element_factory_make ("queue", nullptr);
-  g_object_set (queue_, "max-size-buffers", kFrames, "max-size-bytes", 0u,
-      "max-size-time", kNoLimit, nullptr);
+  g_object_set (queue_, "max-size-buffers", PartnerInput::kQueued,
+      "max-size-bytes", 0u, "max-size-time", kNoLimit, nullptr);
   gst_bin_add (GST_BIN (element_), queue_);
   if (decoder_) {
     gst_element_link_pads (decoder_, "src", restore_, "sink");
@@ -228,13 +226,13 @@ CameraTracks::add_frames (GstPad *pad, const FrameReading &how)
       pad, pad_of (queue_, "sink").get (), GST_PAD_LINK_CHECK_NOTHING);
 }
 
-gboolean
-CameraTracks::on_starving (GstElement *, gpointer self) noexcept
+guint
+CameraTracks::frames_queued (GstElement *, gpointer self) noexcept
 {
-  guint waiting = 0;
+  guint queued = 0;
   g_object_get (static_cast<CameraTracks *> (self)->queue_,
-      "current-level-buffers", &waiting, nullptr);
-  return waiting >= kFrames;
+      "current-level-buffers", &queued, nullptr);
+  return queued;
 }
 
 void
@@ -248,7 +246,8 @@ CameraTracks::begin (Nanoseconds tick)
 {
   restore_ = make_part (gst_coded_exposure_restore_get_type ());
   set_tick (tick);
-  g_signal_connect (restore_, "starving", G_CALLBACK (on_starving), this);
+  g_signal_connect (
+      restore_, "frames-queued", G_CALLBACK (frames_queued), this);
   gst_bin_add (GST_BIN (element_), restore_);
   gst_element_sync_state_with_parent (restore_);
 }

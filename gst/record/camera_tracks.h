@@ -56,7 +56,7 @@ private:
 
   static GstPadProbeReturn on_deep_frame (
       GstPad *, GstPadProbeInfo *info, gpointer self) noexcept;
-  static gboolean on_starving (GstElement *, gpointer self) noexcept;
+  static guint frames_queued (GstElement *, gpointer self) noexcept;
   static GstPadProbeReturn on_decoded (
       GstPad *, GstPadProbeInfo *info, gpointer self) noexcept;
   bool take_raw (GstPad *pad, const GstCaps *caps, const FrameReading &how);

@@ -18,8 +18,9 @@ namespace
 constexpr std::size_t kMost = 8;
 
 /* A recording has a partner of the time of each frame. In a damaged one, none
- * may come any more. If the demuxer has filled the queue of the frames by then,
- * which it would wait for, frames go on without after this time. */
+ * may come any more, or no frame. If the demuxer has filled the queue of the
+ * others by then, which it would wait for, they go on without after this time.
+ */
 constexpr std::chrono::seconds kPatience (5);
 
 PartnerInput &
@@ -35,8 +36,8 @@ input_of (GstPad *pad)
 void
 PartnerInput::add_signal (gpointer klass)
 {
-  g_signal_new ("starving", G_TYPE_FROM_CLASS (klass), G_SIGNAL_RUN_LAST, 0,
-      nullptr, nullptr, nullptr, G_TYPE_BOOLEAN, 0);
+  g_signal_new ("frames-queued", G_TYPE_FROM_CLASS (klass), G_SIGNAL_RUN_LAST,
+      0, nullptr, nullptr, nullptr, G_TYPE_UINT, 0);
 }
 
 void
@@ -60,18 +61,38 @@ PartnerInput::activate (
   return TRUE;
 }
 
+/* The lock is not held while it is emitted. */
+guint
+PartnerInput::frames_queued (
+    std::unique_lock<std::mutex> &lock, gpointer element) const
+{
+  guint queued = 0;
+  lock.unlock ();
+  g_signal_emit_by_name (element, "frames-queued", &queued);
+  lock.lock ();
+  return queued;
+}
+
 /* ------------------------------------------------ thread of the partners -- */
 
 GstFlowReturn
-PartnerInput::chain (GstPad *pad, GstObject *, GstBuffer *buffer) noexcept
+PartnerInput::chain (
+    GstPad *pad, GstObject *element, GstBuffer *buffer) noexcept
 {
   PartnerInput &self = input_of (pad);
   BufferPtr owned (buffer);
   std::unique_lock lock (self.lock_);
-  self.moved_.wait (lock, [&] {
+  const auto has_room = [&] {
     return self.partners_.size () < kMost || !self.is_wanted_ ||
            self.is_flushing_;
-  });
+  };
+  while (!has_room ()) {
+    if (!self.is_ahead_ && self.moved_.wait_for (lock, kPatience, has_room))
+      break;
+    self.is_ahead_ = self.frames_queued (lock, element) == 0;
+    if (self.is_ahead_ && !has_room ())
+      self.partners_.pop_front (); // its frame is missing
+  }
   if (self.is_flushing_)
     return GST_FLOW_FLUSHING;
   if (!self.is_wanted_ || !self.caps_)
@@ -134,7 +155,7 @@ PartnerInput::restart ()
   partners_.clear ();
   caps_.reset ();
   may_wait_ = is_wanted_ = true;
-  is_off_beam_ = has_ended_ = is_stalled_ = false;
+  is_off_beam_ = has_ended_ = is_stalled_ = is_ahead_ = false;
 }
 
 void
@@ -151,24 +172,29 @@ PartnerInput::take (
     GstElement *element, GstClockTime pts, std::optional<Partner> &to)
 {
   std::unique_lock lock (lock_);
+  is_ahead_ = false;
   const auto time_of = [] (const Partner &partner) {
     return GST_BUFFER_PTS (partner.buffer.get ());
   };
   const auto own = [&] { return std::ranges::find (partners_, pts, time_of); };
+  /* Of frames that are missing. */
+  const auto drop_before = [&] {
+    while (partners_.size () >= kMost && time_of (partners_.front ()) < pts &&
+           own () == partners_.end ()) {
+      partners_.pop_front ();
+      moved_.notify_all ();
+    }
+  };
   const auto is_settled = [&] {
+    drop_before ();
     return !gst_pad_is_linked (pad_) || own () != partners_.end () ||
            partners_.size () >= kMost ||
            std::ranges::any_of (partners_,
                [&] (const Partner &one) { return time_of (one) > pts; }) ||
            has_ended_ || is_flushing_ || !may_wait_;
   };
-  while (!is_stalled_ && !moved_.wait_for (lock, kPatience, is_settled)) {
-    gboolean is_backed_up = FALSE;
-    lock.unlock ();
-    g_signal_emit_by_name (element, "starving", &is_backed_up);
-    lock.lock ();
-    is_stalled_ = is_backed_up && !is_settled ();
-  }
+  while (!is_stalled_ && !moved_.wait_for (lock, kPatience, is_settled))
+    is_stalled_ = frames_queued (lock, element) >= kQueued && !is_settled ();
   const auto found = own ();
   if (found == partners_.end ())
     return may_wait_ && !is_flushing_;

@@ -21,9 +21,12 @@ namespace codedexposure::gst
 class PartnerInput
 {
 public:
-  /** Adds the signal "starving" to the class of the element. It is emitted when
-   * no partner has come for seconds; the handler returns whether the queue of
-   * the frames is full. */
+  /** Frames of a camera that a demuxer may read ahead. */
+  static constexpr guint kQueued = 8;
+
+  /** Adds the signal "frames-queued" to the class of the element. It is emitted
+   * when no partner, or no frame for those that came, has come for seconds; the
+   * handler returns how many frames wait in their queue, kQueued at most. */
   static void add_signal (gpointer klass);
 
   /** @p pad: of the element. */
@@ -60,6 +63,8 @@ private:
   static gboolean activate (GstPad *pad, GstObject *parent, GstPadMode mode,
       gboolean active) noexcept;
 
+  guint frames_queued (
+      std::unique_lock<std::mutex> &lock, gpointer element) const;
   void want (bool wanted);
   /** That with the time @p pts, if there is one; those before it are dropped.
    * False: a flush or a stop began before it came. */
@@ -79,6 +84,7 @@ private:
   bool is_off_beam_ = false;
   bool has_ended_ = false;  ///< no partner follows
   bool is_stalled_ = false; ///< none came while frames filled their queue
+  bool is_ahead_ = false;   ///< no frames came while these filled theirs
 };
 
 } // namespace codedexposure::gst

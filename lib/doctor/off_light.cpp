@@ -18,8 +18,8 @@ namespace
  * much time after the light of the pedestal. */
 constexpr int kShorter = 5;
 constexpr double kAfterPedestal = 50e3; // ns
-/* Change of the light from look to look, DN, above which there are some; less
- * is 0.02 % of the light that the mirrors pass when they are on. */
+/* Change of the light from look to look, DN, above which there are several
+ * looks; it is 0.02 % of half of what a pixel of 8 bits can hold. */
 constexpr double kUnsteady = 0.025;
 constexpr int kRounds = 3;
 /* Variance of the noise with which rounding can be undone, DN squared. */

@@ -210,7 +210,7 @@ decode_one_hot (const Block<T> &block, const Layout<T> &layout,
 {
   using Number = NumberOf<T>;
   constexpr int kN = Width * Width;
-  const Linear linear = decoder; // which pixels that are written cannot change
+  const Linear linear = decoder; // pixels that are written cannot change it
   const LinearTerm term = linear.terms[0];
   T *of_element[kN];
   for (int s = 0; s < kN; s++)

@@ -118,6 +118,7 @@ numbers_of (Vector<From> v)
   return {unpacked<Number, 0, From> (v), unpacked<Number, 1, From> (v)};
 }
 
+/** The same from memory. */
 template <typename Number, typename From>
 CODEDEXPOSURE_INLINE Two<Vector<Number>>
 load_cells (const From *from)

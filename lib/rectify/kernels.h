@@ -43,11 +43,18 @@ struct FilterError {
   float scene, noise;
 };
 
+/** How rough the scene is, for windows whose first pixel is (x, y), (x + 1, y)
+ * ...: sums of MeasureRow. */
+struct Roughness {
+  const float *first = nullptr; ///< null: the first filter of each is used
+  std::ptrdiff_t length = 0;    ///< of a row
+  int x = 0, y = 0;
+};
+
 /** Of every mirror: weights, row by row, each filled up with zeros to
  * row_length (), and errors, kNoises of each after the other. */
 struct Filters {
   const float *weights;
-  /** Null: the first filter of each mirror is used. */
   const WindowScale *scales;
   const FilterError *errors;
   /** Ratios of the scene's variance and the noise's: below each, the filters
@@ -55,6 +62,7 @@ struct Filters {
   float limits[kNoises - 1];
   float noise;   ///< of a pixel: variance, DN^2
   float largest; ///< DN, to which results are clamped
+  Roughness roughness = {};
 };
 
 /** Pixels of a camera. */
@@ -65,6 +73,17 @@ struct Source {
   int width;
 };
 
+/** Differences along each side of a window that say how rough it is. */
+constexpr int kSteps = 4;
+
+/** Sums of squared differences of neighbours in blocks of 5 x 5 pixels, whose
+ * first ones are those of a row: of kSteps x kSteps pixels with those right of
+ * them and below.
+ * @p from   from the first block on.
+ * @p count  blocks, at most from.width - kSteps. */
+template <typename Pixel>
+using MeasureRow = void (const Source<Pixel> &from, int count, float *to);
+
 /** Mirrors of a row.
  * @p errors  their errors beyond the noise, rms, DN; null: not wanted. */
 template <typename Pixel>
@@ -73,6 +92,8 @@ using RectifyRow = void (const Source<Pixel> &from, const Place *places,
 
 struct Kernels {
   std::string_view name;
+  MeasureRow<std::uint8_t> *measure_bytes;
+  MeasureRow<std::uint16_t> *measure_words;
   /** For windows of 5, 7 and 9 pixels along a side. */
   RectifyRow<std::uint8_t> *bytes[3];
   RectifyRow<std::uint16_t> *words[3];

@@ -6,8 +6,8 @@ namespace codedexposure::CODEDEXPOSURE_TARGET
 {
 
 extern const rectify::Kernels kernels;
-const rectify::Kernels kernels = {CODEDEXPOSURE_TARGET_NAME,
-    {rectify_row<5>, rectify_row<7>, rectify_row<9>},
+const rectify::Kernels kernels = {CODEDEXPOSURE_TARGET_NAME, measure_row,
+    measure_row, {rectify_row<5>, rectify_row<7>, rectify_row<9>},
     {rectify_row<5>, rectify_row<7>, rectify_row<9>}};
 
 } // namespace codedexposure::CODEDEXPOSURE_TARGET

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <new>
 #include <numbers>
 #include <optional>
@@ -60,6 +61,7 @@ struct Rectifier::Plan {
   int taps = 1;
   RectifyReport report;
   Image<Place> places;
+  Rect windows; // first pixels of all of them
   FilterBank::Tables filters;
   rectify::Kernels kernels;
   float noise = 0.0f; // rms, as a part of white
@@ -69,7 +71,10 @@ struct Rectifier::Plan {
 
   template <typename Pixel>
   rectify::RectifyRow<Pixel> *run_row () const;
-  rectify::Filters filters_for (int largest) const;
+  template <typename Pixel>
+  std::unique_ptr<float[]> measure (
+      ImageView<const Pixel> from, Workers *workers) const;
+  rectify::Filters filters_for (int largest, const float *roughness) const;
   template <typename Pixel>
   Result<void> run (ImageView<const Pixel> from, ImageView<Pixel> to,
       int largest, const std::optional<ImageView<float>> &errors,
@@ -234,6 +239,36 @@ check_slope (const PixelView &view)
                real_text (kMaxSlope) + " a pixel"};
 }
 
+/* The first pixels of all windows. */
+Rect
+windows_of (ImageView<const Place> places)
+{
+  constexpr int kNone = std::numeric_limits<std::int16_t>::max ();
+  int left = kNone, top = kNone, right = 0, bottom = 0;
+  for (int y = 0; y < places.height; y++)
+    for (int x = 0; x < places.width; x++)
+      if (const Place &place = places.at (x, y); place.filter >= 0) {
+        left = std::min<int> (left, place.x);
+        top = std::min<int> (top, place.y);
+        right = std::max (right, place.x + 1);
+        bottom = std::max (bottom, place.y + 1);
+      }
+  if (right == 0)
+    return {};
+  return {left, top, right - left, bottom - top};
+}
+
+/* Parts 0 .. parts - 1; null: on the caller's thread. */
+template <typename Part>
+void
+run_parts (Workers *workers, int parts, const Part &part)
+{
+  if (workers)
+    workers->run (parts, [&] (int i, int) { part (i); });
+  for (int i = 0; !workers && i < parts; i++)
+    part (i);
+}
+
 /* @effort: to find the weights, as a part of what is allowed. */
 Result<void>
 check_effort (const PixelView &view, double effort)
@@ -289,6 +324,7 @@ try {
   plan->places = Image<Place> (plan->mirrors.width, plan->mirrors.height);
   for (int y = 0; y < plan->mirrors.height; y++)
     planner.place_row (y, plan->places.view ().row (y), plan->report);
+  plan->windows = windows_of (plan->places.view ());
   if (options.correct && planner.mean_share (plan->report) < kBetween)
     plan->sight = Sight::make (mapping, planner.solver ());
   if (plan->sight)
@@ -366,12 +402,31 @@ Rectifier::Plan::run_row () const
       std::tie (kernels.bytes, kernels.words))[(taps - kWindows[0].taps) / 2];
 }
 
+/* How rough the scene is around the windows of all mirrors. */
+template <typename Pixel>
+std::unique_ptr<float[]>
+Rectifier::Plan::measure (ImageView<const Pixel> from, Workers *workers) const
+{
+  const auto row_kernel = std::get<rectify::MeasureRow<Pixel> *const &> (
+      std::tie (kernels.measure_bytes, kernels.measure_words));
+  auto roughness = std::make_unique_for_overwrite<float[]> (
+      std::size_t (windows.width) * std::size_t (windows.height));
+  const int inside = (taps - 1 - rectify::kSteps) / 2;
+  const int left = windows.x + inside, top = windows.y + inside;
+  run_parts (workers, windows.height, [&] (int y) {
+    row_kernel ({from.row (top + y) + left, from.stride, from.width - left},
+        windows.width, roughness.get () + std::ptrdiff_t (y) * windows.width);
+  });
+  return roughness;
+}
+
 rectify::Filters
-Rectifier::Plan::filters_for (int largest) const
+Rectifier::Plan::filters_for (int largest, const float *roughness) const
 {
   rectify::Filters with{filters.weights.data (), filters.scales.data (),
       filters.errors.data (), {},
-      noise * noise * float (largest) * float (largest), float (largest)};
+      noise * noise * float (largest) * float (largest), float (largest),
+      {roughness, windows.width, windows.x, windows.y}};
   for (std::size_t i = 0; i + 1 < FilterBank::kNoises.size (); i++)
     with.limits[i] =
         float (1.0 / (FilterBank::kNoises[i] * FilterBank::kNoises[i + 1]));
@@ -395,16 +450,13 @@ try {
         ViewBytes::of (*errors), "errors", mirrors.width, mirrors.height));
   if (largest <= 0)
     largest = std::numeric_limits<Pixel>::max ();
-  const rectify::Filters with = filters_for (largest);
+  const auto roughness = measure (from, workers);
+  const rectify::Filters with = filters_for (largest, roughness.get ());
   const rectify::Source<Pixel> source{from.row (0), from.stride, from.width};
-  const auto run_one = [&] (int y, int) {
+  run_parts (workers, mirrors.height, [&] (int y) {
     run_row<Pixel> () (source, places.view ().row (y), mirrors.width, with,
         to.row (y), errors ? errors->row (y) : nullptr);
-  };
-  if (workers)
-    workers->run (mirrors.height, run_one);
-  for (int y = 0; !workers && y < mirrors.height; y++)
-    run_one (y, 0);
+  });
   if (keep_unknown)
     mark_unknown (from, to, Pixel (largest));
   return {};
@@ -487,7 +539,9 @@ try {
   const ImageView<const std::uint16_t> view = std::as_const (seen).view ();
   const rectify::Source<std::uint16_t> source{
       view.row (0), view.stride, view.width};
-  const rectify::Filters with = filters_for (int (kWideWhite));
+  const auto roughness = measure (view, &workers);
+  const rectify::Filters with =
+      filters_for (int (kWideWhite), roughness.get ());
   workers.run (std::max (expected.height - 2 * reach, 0), [&] (int row, int) {
     const int y = reach + row;
     std::vector<std::uint16_t> made (std::size_t (mirrors.width));

@@ -62,8 +62,8 @@ struct RectifyReport {
  *
  * Weights are made once, for fractions of a pixel; along the borders of
  * regions, where pixels mix two codes, for each mirror. run () is const, can be
- * called from several threads, and allocates nothing, or a few bytes with
- * workers, and with keep_unknown a byte for each row of the camera.
+ * called from several threads, and allocates four bytes for each pixel of the
+ * camera around which weights are used.
  */
 class Rectifier
 {

@@ -72,9 +72,6 @@ four_of (Eight v)
   return __builtin_shufflevector (v, v, First, First + 1, First + 2, First + 3);
 }
 
-/** Differences along each side of a window that say how rough it is. */
-constexpr int kSteps = 4;
-
 /** Where the first pixel of a window is, and the next row, in bytes. */
 template <typename Pixel>
 struct Corner {
@@ -88,27 +85,62 @@ struct Corner {
   }
 };
 
+/** Of blocks whose first pixels are eight of a row: the differences of a column
+ * each. */
+template <typename Pixel>
+CODEDEXPOSURE_INLINE Eight
+columns_at (const Corner<Pixel> &at)
+{
+  Eight across = {}, down = {}, here = load_eight (at.row (0));
+  for (int y = 0; y < rectify::kSteps; y++) {
+    const Eight below = load_eight (at.row (y + 1));
+    const Eight right = load_eight (at.row (y) + 1);
+    across += (right - here) * (right - here);
+    down += (below - here) * (below - here);
+    here = below;
+  }
+  return across + down;
+}
+
+/** The same near the end of a row, of which @p width pixels are left. */
+template <typename Pixel>
+CODEDEXPOSURE_INLINE Eight
+last_columns_at (const Corner<Pixel> &at, int width)
+{
+  constexpr int kCopied = 9;
+  Pixel copy[(rectify::kSteps + 1) * kCopied] = {};
+  for (int y = 0; y <= rectify::kSteps; y++)
+    for (int x = 0; x < width; x++)
+      copy[y * kCopied + x] = at.row (y)[x];
+  return columns_at (Corner<Pixel>{copy, kCopied * sizeof (Pixel)});
+}
+
+/** MeasureRow. */
+template <typename Pixel>
+void
+measure_row (const rectify::Source<Pixel> &from, int count, float *to)
+{
+  constexpr int kLength = 128, kColumns = kLength + 8;
+  float columns[kColumns];
+  for (int x = 0; x < count; x += kLength) {
+    const int some = count - x < kLength ? count - x : kLength;
+    for (int i = 0; i < some + rectify::kSteps - 1; i += 8) {
+      const Corner<Pixel> at{from.first + x + i, from.stride};
+      const int left = from.width - x - i;
+      const Eight eight =
+          left > 8 ? columns_at (at) : last_columns_at (at, left);
+      __builtin_memcpy (columns + i, &eight, sizeof eight);
+    }
+    for (int i = 0; i < some; i++)
+      to[x + i] =
+          (columns[i] + columns[i + 1]) + (columns[i + 2] + columns[i + 3]);
+  }
+}
+
 /** kTaps x kTaps pixels. */
 template <int kTaps, typename Pixel>
 struct Window {
   Corner<Pixel> at;
-
-  /** Four parts of the sum of squared differences of neighbours among the
-   * central 5 x 5 pixels. */
-  CODEDEXPOSURE_INLINE Four roughness () const
-  {
-    constexpr int kFirst = kTaps / 2 - 2;
-    Eight across = {}, down = {}, here = load_eight (at.row (kFirst));
-    for (int y = kFirst; y < kFirst + kSteps; y++) {
-      const Eight below = load_eight (at.row (y + 1));
-      const Eight right =
-          __builtin_shufflevector (here, here, 1, 2, 3, 4, 5, 6, 7, 7);
-      across += (right - here) * (right - here);
-      down += (below - here) * (below - here);
-      here = below;
-    }
-    return four_of<kFirst> (across + down);
-  }
 
   /** Four parts of the sum. @p weights: see Filters. */
   CODEDEXPOSURE_INLINE Four filtered (const float *weights) const
@@ -181,22 +213,25 @@ public:
   /** Differences beyond the noise are the scene's. */
   CODEDEXPOSURE_INLINE void choose (const rectify::Place *places, int count)
   {
-    for (int x = 0; x < count; x++) {
+    const rectify::Roughness &map = filters_.roughness;
+    for (int x = 0; x < count; x++)
       chosen_[x] = places[x].filter * rectify::kNoises;
-      const bool sought = places[x].filter >= 0 && filters_.scales;
-      scales_[x] =
-          sought ? filters_.scales[places[x].filter] : rectify::WindowScale{};
-      parts_[x] = sought ? windows_.of (places[x]).roughness () : Four{};
-    }
-    constexpr int kDifferences = 2 * kSteps * kSteps;
+    if (!map.first)
+      return;
+    constexpr int kDifferences = 2 * rectify::kSteps * rectify::kSteps;
     const float to_noise = 0.5f / filters_.noise;
-    for (int x = 0; x < count && filters_.scales; x++) {
-      const float rough = sum_of (x) / kDifferences;
-      scene_[x] = (rough * to_noise * scales_[x].darkness - 1.0f) *
-                  scales_[x].smoothness;
+    for (int x = 0; x < count; x++) {
+      scene_[x] = 0.0f;
+      if (places[x].filter < 0)
+        continue;
+      const rectify::WindowScale &scale = filters_.scales[places[x].filter];
+      const float rough =
+          map.first[(places[x].y - map.y) * map.length + places[x].x - map.x];
+      scene_[x] = (rough / kDifferences * to_noise * scale.darkness - 1.0f) *
+                  scale.smoothness;
     }
     for (const float limit : filters_.limits)
-      for (int x = 0; x < count && filters_.scales; x++)
+      for (int x = 0; x < count; x++)
         chosen_[x] += scene_[x] <= limit;
   }
 
@@ -246,7 +281,6 @@ private:
   const rectify::Filters &filters_;
   Windows<kTaps, Pixel> windows_;
   Four parts_[kMost];
-  rectify::WindowScale scales_[kMost];
   float scene_[kMost] = {};
   std::int32_t chosen_[kMost];
 };

@@ -69,11 +69,32 @@ random_row (int taps, float largest)
   return row;
 }
 
+template <typename Pixel>
+float
+rough_at (ImageView<const Pixel> from, int x, int y)
+{
+  const auto squared = [&] (int i, int j, int right, int below) {
+    const float difference = float (from.at (x + i + right, y + j + below)) -
+                             float (from.at (x + i, y + j));
+    return difference * difference;
+  };
+  float columns[kSteps];
+  for (int i = 0; i < kSteps; i++) {
+    float across = 0.0f, down = 0.0f;
+    for (int j = 0; j < kSteps; j++) {
+      across += squared (i, j, 1, 0);
+      down += squared (i, j, 0, 1);
+    }
+    columns[i] = across + down;
+  }
+  return (columns[0] + columns[1]) + (columns[2] + columns[3]);
+}
+
 /** Sums in the order of the kernels: of lanes, which are columns modulo 4. */
 template <typename Pixel>
 void
-reference (ImageView<const Pixel> from, const Row &row, int taps, Pixel *to,
-    float *errors)
+reference (ImageView<const Pixel> from, const Row &row, int taps, bool chosen,
+    Pixel *to, float *errors)
 {
   const Filters &filters = row.filters;
   for (std::size_t i = 0; i < row.places.size (); i++) {
@@ -89,26 +110,13 @@ reference (ImageView<const Pixel> from, const Row &row, int taps, Pixel *to,
     const auto sum_of = [] (const float *lanes) {
       return (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
     };
-    const int first = taps / 2 - 2;
-    float differences[4];
-    for (int lane = 0; lane < 4; lane++) {
-      float across = 0.0f, down = 0.0f;
-      for (int y = first; y < first + 4; y++) {
-        const int x = first + lane;
-        const float right = at (x + 1, y) - at (x, y);
-        const float below = at (x, y + 1) - at (x, y);
-        across += right * right;
-        down += below * below;
-      }
-      differences[lane] = across + down;
-    }
     float scene = 0.0f;
     int filter = place.filter * kNoises;
-    if (filters.scales) {
+    if (chosen) {
       const WindowScale &scale = filters.scales[place.filter];
-      scene = (sum_of (differences) / 32.0f * (0.5f / filters.noise) *
-                      scale.darkness -
-                  1.0f) *
+      const int inside = taps / 2 - 2;
+      const float rough = rough_at (from, place.x + inside, place.y + inside);
+      scene = (rough / 32.0f * (0.5f / filters.noise) * scale.darkness - 1.0f) *
               scale.smoothness;
       for (const float limit : filters.limits)
         filter += scene <= limit;
@@ -128,6 +136,21 @@ reference (ImageView<const Pixel> from, const Row &row, int taps, Pixel *to,
   }
 }
 
+/** Of the blocks whose first pixels those of row @p y are, from @p x on. */
+template <typename Pixel>
+std::vector<float>
+measured_row (const Kernels &kernels, ImageView<const Pixel> from, int x, int y)
+{
+  MeasureRow<Pixel> *run = std::get<MeasureRow<Pixel> *const &> (
+      std::tie (kernels.measure_bytes, kernels.measure_words));
+  const int count = from.width - x - kSteps;
+  std::vector<float> row (std::size_t (count) + 1, 77.0f);
+  run ({from.row (y) + x, from.stride, from.width - x}, count, row.data ());
+  EXPECT_EQ (row.back (), 77.0f); // nothing behind the row
+  row.pop_back ();
+  return row;
+}
+
 /** @p chosen  whether filters are chosen by the noise. */
 template <typename Pixel>
 void
@@ -143,18 +166,25 @@ compare (float largest, bool chosen)
   const Source<Pixel> source{view.row (0), view.stride, view.width};
   for (const int taps : {5, 7, 9}) {
     Row row = random_row (taps, largest);
-    if (!chosen)
-      row.filters.scales = nullptr;
     const std::size_t count = row.places.size ();
     std::vector<Pixel> expected (count);
     std::vector<float> expected_errors (count);
-    reference (view, row, taps, expected.data (), expected_errors.data ());
+    reference (
+        view, row, taps, chosen, expected.data (), expected_errors.data ());
     EXPECT_GT (std::count (expected.begin (), expected.end (), 0), 5);
     for (const Kernels &kernels : supported_kernels ()) {
       SCOPED_TRACE (kernels.name);
       SCOPED_TRACE (taps);
       RectifyRow<Pixel> *run = std::get<RectifyRow<Pixel> *const(&)[3]> (
           std::tie (kernels.bytes, kernels.words))[(taps - 5) / 2];
+      const int inside = taps / 2 - 2;
+      std::vector<float> roughness;
+      for (int y = 0; y + kSteps < kCamera.height; y++)
+        for (const float sum : measured_row (kernels, view, 0, y))
+          roughness.push_back (sum);
+      if (chosen)
+        row.filters.roughness = {
+            roughness.data (), kCamera.width - kSteps, -inside, -inside};
       std::vector<Pixel> made (count + 1, Pixel (77)), without (made);
       std::vector<float> errors (count + 1, 77.0f);
       run (source, row.places.data (), int (count), row.filters, made.data (),
@@ -170,6 +200,36 @@ compare (float largest, bool chosen)
       EXPECT_EQ (errors, expected_errors);
     }
   }
+}
+
+/* With nothing behind the last row. */
+template <typename Pixel>
+void
+compare_measures ()
+{
+  std::mt19937 random{6};
+  for (const int width : {5, 8, 9, 12, 13, 131, 132, 133, 300}) {
+    Image<Pixel> frame (width, kSteps + 1);
+    for (int y = 0; y <= kSteps; y++)
+      for (int x = 0; x < width; x++)
+        frame.at (x, y) = Pixel (random ());
+    const ImageView<const Pixel> view = std::as_const (frame).view ();
+    for (const Kernels &kernels : supported_kernels ()) {
+      SCOPED_TRACE (kernels.name);
+      for (const int first : {0, 1, width - kSteps - 1}) {
+        std::vector<float> expected;
+        for (int x = first; x + kSteps < width; x++)
+          expected.push_back (rough_at (view, x, 0));
+        EXPECT_EQ (measured_row (kernels, view, first, 0), expected) << width;
+      }
+    }
+  }
+}
+
+TEST (RectifyKernels, MeasureAsTheReferenceDoes)
+{
+  compare_measures<std::uint8_t> ();
+  compare_measures<std::uint16_t> ();
 }
 
 TEST (RectifyKernels, EqualTheReference)

@@ -203,10 +203,9 @@ Pack::publish (Part &part, const std::string &recording, std::size_t frames)
       part.path (), fs::status (recording, error).permissions (), error);
   if (const auto published = part.publish (run_.force || !output_); !published)
     give_up (part, published.error ().message);
-  status_.line ("wrote " + part.name () +
-                format (": %zu coded frames, %.0f %% of the raw size, all "
-                        "checked",
-                    frames, 100 * size / raw));
+  status_.line (
+      "wrote " + part.name () + ": " + coded_frames (frames) +
+      format (", %.0f %% of the raw size, all checked", 100 * size / raw));
 }
 
 void

@@ -186,8 +186,7 @@ ReportPage::losses () const
       [] (const auto &frame) { return frame.damaged; });
   if (lost == 0 && damaged == 0)
     return "none";
-  return format (
-      "%" PRIu64 " coded frames lost, %d damaged", lost, int (damaged));
+  return coded_frames (lost) + format (" lost, %d damaged", int (damaged));
 }
 
 Rows

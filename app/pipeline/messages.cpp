@@ -185,6 +185,13 @@ seconds_since (std::chrono::steady_clock::time_point begin)
 }
 
 std::string
+coded_frames (std::uint64_t count)
+{
+  return std::to_string (count) +
+         (count == 1 ? " coded frame" : " coded frames");
+}
+
+std::string
 minutes (double seconds)
 {
   const int whole = int (seconds + 0.5);

@@ -23,6 +23,9 @@ std::string joined (const std::vector<std::string> &texts);
 
 double seconds_since (std::chrono::steady_clock::time_point begin);
 
+/** "1 coded frame", "2 coded frames". */
+std::string coded_frames (std::uint64_t count);
+
 /** "m:ss" of a time in seconds. */
 std::string minutes (double seconds);
 

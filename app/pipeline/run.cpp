@@ -442,13 +442,13 @@ Run::tick ()
   if (job_.window) {
     const std::string flaws = flaws_of (pipeline (), job_.recorders);
     job_.window->tell (
-        format ("%" G_GINT64_FORMAT " coded frames", frames) +
+        coded_frames (guint64 (frames)) +
             (flaws.empty () ? ", none lost or corrupted" : flaws),
         !flaws.empty ());
   }
   const double done = counter_->done (job_.total.value_or (0));
-  std::string text = format ("%" G_GINT64_FORMAT " coded frames in %s", frames,
-      minutes (seconds).c_str ());
+  std::string text =
+      coded_frames (guint64 (frames)) + " in " + minutes (seconds);
   if (done > 0 && done <= 1)
     text += format (", %.0f %%, %s left", 100 * done,
         minutes (seconds * (1 - done) / done).c_str ());

@@ -89,10 +89,9 @@ Run::finish ()
   if (frames () > 0 || !counter_)
     print_result (flaws, wrote);
   if (lost > 0)
-    status_.line (
-        format ("%" G_GUINT64_FORMAT " coded frames were lost and are "
-                "not in the recording, which says where",
-            lost));
+    status_.line (coded_frames (lost) +
+                  (lost == 1 ? " was lost and is" : " were lost and are") +
+                  " not in the recording, which says where");
   if (job_.options.json)
     print_json (result.exit, flaws);
   return result;
@@ -107,7 +106,7 @@ Run::print_result (const std::string &flaws, const std::string &wrote)
     return;
   std::string text;
   if (counter_)
-    text = format ("%" G_GINT64_FORMAT " coded frames", frames ()) +
+    text = coded_frames (guint64 (frames ())) +
            (job_.source.empty () ? "" : " of " + job_.source) + flaws;
   if (const int count = receivers_ ? receivers_->count () : 0; count > 0)
     text += format ("; sent to %d receiver%s", count, count > 1 ? "s" : "");

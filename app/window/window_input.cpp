@@ -82,8 +82,8 @@ Window::take_kept (GstMessage *message)
   if (GST_MESSAGE_SRC (message) != GST_OBJECT (setup_.keeper))
     return false;
   if (const auto kept = parse_message<Kept> (message))
-    calls_.said (format ("%s (%" G_GUINT64_FORMAT " coded frames, %.2f s)",
-                     kept->location.c_str (), kept->frames,
+    calls_.said (format ("%s (%s, %.2f s)", kept->location.c_str (),
+                     coded_frames (kept->frames).c_str (),
                      1e-9 * double (kept->duration)),
         false);
   else if (const auto event = parse_message<EventFound> (message))

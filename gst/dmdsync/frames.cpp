@@ -148,14 +148,15 @@ take_loss (GstDmdSync *self, const Frame &frame)
   stream.discont = true;
   count (self, &Counters::frames_lost, lost);
   GST_INFO_OBJECT (self,
-      "%" G_GUINT64_FORMAT " frames lost before %" GST_TIME_FORMAT, lost,
-      GST_TIME_ARGS (frame.pts));
+      "frames lost before %" GST_TIME_FORMAT ": %" G_GUINT64_FORMAT,
+      GST_TIME_ARGS (frame.pts), lost);
   post_message (self, FramesLost{lost, from, frame.pts});
   if (on_loss == OnLoss::error && stream.coded) {
     GST_ELEMENT_ERROR (self, RESOURCE, READ,
-        ("%" G_GUINT64_FORMAT " frames were lost before %" GST_TIME_FORMAT
+        ("%" G_GUINT64_FORMAT " %s lost before %" GST_TIME_FORMAT
          ", and on-loss=error says to stop",
-            lost, GST_TIME_ARGS (frame.pts)),
+            lost, lost == 1 ? "frame was" : "frames were",
+            GST_TIME_ARGS (frame.pts)),
         (nullptr));
     return GST_FLOW_ERROR;
   }

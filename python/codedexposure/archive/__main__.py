@@ -269,7 +269,7 @@ def verify(store, made):
         pictures += said['counts']['pictures']
     print(f'{len(made.recordings) - bad} of {len(made.recordings)} recordings are '
           f'as merged: {coded} coded frames, each with its pictures exactly once '
-          f'({pictures}); {lost} were lost before they were recorded')
+          f'({pictures}); {lost} {"was" if lost == 1 else "were"} lost before recording')
     return 1 if bad else 0
 
 

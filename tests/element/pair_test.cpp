@@ -506,9 +506,8 @@ TEST (PairLive, AFrameWaitsForItsPartnerAndThenGoesAlone)
   next.reset (gst_harness_pull (pair.get ()));
   ASSERT_TRUE (next);
   EXPECT_FALSE (get_partner (next.get ()));
-  EXPECT_EQ (
-      gst_clock_get_time (GST_CLOCK (gst_harness_get_testclock (pair.get ()))),
-      kPeriod + 15 * kMs);
+  const ObjectPtr<GstTestClock> clock (gst_harness_get_testclock (pair.get ()));
+  EXPECT_EQ (gst_clock_get_time (GST_CLOCK (clock.get ())), kPeriod + 15 * kMs);
 }
 
 } // namespace

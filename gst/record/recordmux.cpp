@@ -416,6 +416,7 @@ follow_caps (GstElement *self, GstEvent *event)
   gst_pad_link (pad_of (branch.frames, "src").get (), branch.video);
 }
 
+/* The start of a flush comes beside a frame, and touches nothing. */
 GstPadProbeReturn
 on_input (GstPad *, GstPadProbeInfo *info, gpointer data) noexcept
 {
@@ -433,7 +434,8 @@ on_input (GstPad *, GstPadProbeInfo *info, gpointer data) noexcept
     follow_caps (self, event);
   if (event && GST_EVENT_TYPE (event) == GST_EVENT_TAG)
     follow_tags (self, event);
-  state.has_begun |= is_frame;
+  if (is_frame)
+    state.has_begun = true;
   return GST_PAD_PROBE_OK;
 }
 

@@ -2,6 +2,7 @@
 #include "rectify/rectifier.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -17,6 +18,7 @@
 #include "base/text.h"
 #include "base/try.h"
 #include "base/view_check.h"
+#include "rectify/correction.h"
 #include "rectify/filters.h"
 #include "rectify/sight.h"
 
@@ -68,13 +70,24 @@ struct Rectifier::Plan {
   bool keep_unknown = false;
   std::optional<Sight> sight; // of correct ()
   int reach = 0;              // mirrors on which one depends, to each side
+  /* Of measure (), for the next frame: a system takes long to give so much. */
+  mutable std::atomic<float *> spare = nullptr;
+
+  ~Plan () { delete[] spare.load (); }
+  struct Keep {
+    const Plan *plan;
+    void operator() (float *memory) const
+    {
+      delete[] plan->spare.exchange (memory);
+    }
+  };
+  using Measured = std::unique_ptr<float[], Keep>;
 
   template <typename Pixel>
   rectify::RectifyRow<Pixel> *run_row () const;
   template <typename Pixel>
-  std::unique_ptr<float[]> measure (
-      ImageView<const Pixel> from, Workers *workers) const;
-  rectify::Filters filters_for (int largest, const float *roughness) const;
+  Measured measure (ImageView<const Pixel> from, Workers *workers) const;
+  rectify::Filters filters_for (int largest, const Measured &roughness) const;
   template <typename Pixel>
   Result<void> run (ImageView<const Pixel> from, ImageView<Pixel> to,
       int largest, const std::optional<ImageView<float>> &errors,
@@ -212,14 +225,11 @@ check_mirrors (const Mapping &mapping)
   const auto area = [] (Extent size) {
     return std::int64_t (size.width) * size.height;
   };
-  const auto text = [] (Extent size) {
-    return std::to_string (size.width) + "x" + std::to_string (size.height);
-  };
   const Extent camera = mapping.camera (), mirrors = mapping.mirrors ();
   if (area (mirrors) <= std::max (kAnyway, kForEachPixel * area (camera)))
     return {};
-  return Error{"a mapping to " + text (mirrors) +
-               " mirrors cannot be used for frames of " + text (camera) +
+  return Error{"a mapping to " + size_text (mirrors) +
+               " mirrors cannot be used for frames of " + size_text (camera) +
                " pixels, which see few of them; use the mapping of this bench"};
 }
 
@@ -253,9 +263,7 @@ windows_of (ImageView<const Place> places)
         right = std::max (right, place.x + 1);
         bottom = std::max (bottom, place.y + 1);
       }
-  if (right == 0)
-    return {};
-  return {left, top, right - left, bottom - top};
+  return {left, top, std::max (right - left, 0), std::max (bottom - top, 0)};
 }
 
 /* Parts 0 .. parts - 1; null: on the caller's thread. */
@@ -275,14 +283,13 @@ check_effort (const PixelView &view, double effort)
 {
   if (effort <= 1.0)
     return {};
-  return Error{
-      "with a blur of " + real_text (view.sigma) +
-      " pixels (psf_sigma) and this schedule, it takes " +
-      real_text (std::ceil (effort)) +
-      " times as long as allowed to find the weights of the pixels "
-      "around each mirror; focus the camera, use a schedule with a smaller "
-      "tile "
-      "or fewer regions, or leave psf_sigma out, and the blur uncorrected"};
+  return Error{"with a blur of " + real_text (view.sigma) +
+               " pixels (psf_sigma) and this schedule, it takes " +
+               real_text (std::ceil (effort)) +
+               " times as long as allowed to find the weights of the pixels "
+               "around each mirror; focus the camera, use a schedule with a "
+               "smaller tile or fewer regions, or leave psf_sigma out, and the "
+               "blur uncorrected"};
 }
 
 } // namespace
@@ -404,13 +411,15 @@ Rectifier::Plan::run_row () const
 
 /* How rough the scene is around the windows of all mirrors. */
 template <typename Pixel>
-std::unique_ptr<float[]>
+Rectifier::Plan::Measured
 Rectifier::Plan::measure (ImageView<const Pixel> from, Workers *workers) const
 {
   const auto row_kernel = std::get<rectify::MeasureRow<Pixel> *const &> (
       std::tie (kernels.measure_bytes, kernels.measure_words));
-  auto roughness = std::make_unique_for_overwrite<float[]> (
-      std::size_t (windows.width) * std::size_t (windows.height));
+  Measured roughness (spare.exchange (nullptr), {this});
+  if (!roughness)
+    roughness.reset (
+        new float[std::size_t (windows.width) * std::size_t (windows.height)]);
   const int inside = (taps - 1 - rectify::kSteps) / 2;
   const int left = windows.x + inside, top = windows.y + inside;
   run_parts (workers, windows.height, [&] (int y) {
@@ -421,12 +430,12 @@ Rectifier::Plan::measure (ImageView<const Pixel> from, Workers *workers) const
 }
 
 rectify::Filters
-Rectifier::Plan::filters_for (int largest, const float *roughness) const
+Rectifier::Plan::filters_for (int largest, const Measured &roughness) const
 {
   rectify::Filters with{filters.weights.data (), filters.scales.data (),
       filters.errors.data (), {},
       noise * noise * float (largest) * float (largest), float (largest),
-      {roughness, windows.width, windows.x, windows.y}};
+      {roughness.get (), windows.width, windows.x, windows.y}};
   for (std::size_t i = 0; i + 1 < FilterBank::kNoises.size (); i++)
     with.limits[i] =
         float (1.0 / (FilterBank::kNoises[i] * FilterBank::kNoises[i + 1]));
@@ -451,7 +460,7 @@ try {
   if (largest <= 0)
     largest = std::numeric_limits<Pixel>::max ();
   const auto roughness = measure (from, workers);
-  const rectify::Filters with = filters_for (largest, roughness.get ());
+  const rectify::Filters with = filters_for (largest, roughness);
   const rectify::Source<Pixel> source{from.row (0), from.stride, from.width};
   run_parts (workers, mirrors.height, [&] (int y) {
     run_row<Pixel> () (source, places.view ().row (y), mirrors.width, with,
@@ -463,60 +472,6 @@ try {
 } catch (const std::bad_alloc &) {
   return out_of_memory ();
 }
-
-namespace
-{
-
-constexpr float kWideWhite = 65535.0f;
-
-/* @p expected in units of which kWideWhite are as much as @p largest of
- * @p mirrors, by the ratio of least squares. */
-template <typename Pixel>
-Image<std::uint16_t>
-scaled_light (ImageView<const std::uint16_t> expected,
-    ImageView<const Pixel> mirrors, int largest)
-{
-  double products = 0.0, squares = 0.0;
-  for (int y = 0; y < expected.height; y++) {
-    const std::uint16_t *light = expected.row (y);
-    const Pixel *made = mirrors.row (y);
-    float of_row = 0.0f, squares_of_row = 0.0f;
-    for (int x = 0; x < expected.width; x++) {
-      const float known = made[x] < largest ? float (light[x]) : 0.0f;
-      of_row += known * float (made[x]);
-      squares_of_row += known * known;
-    }
-    products += double (of_row);
-    squares += double (squares_of_row);
-  }
-  const float scale =
-      squares > 0.0 ? float (products / squares) * kWideWhite / float (largest)
-                    : 0.0f;
-  Image<std::uint16_t> scaled (expected.width, expected.height);
-  for (int y = 0; y < expected.height; y++)
-    for (int x = 0; x < expected.width; x++)
-      scaled.view ().row (y)[x] = std::uint16_t (
-          std::min (float (expected.row (y)[x]) * scale + 0.5f, kWideWhite));
-  return scaled;
-}
-
-/* Of a row but for its ends; what is saturated stays so, and nothing else gets
- * it. */
-template <typename Pixel>
-void
-take_off (const std::uint16_t *made, const std::uint16_t *truth, int count,
-    int ends, int largest, Pixel *row)
-{
-  const float scale = float (largest) / kWideWhite;
-  for (int x = ends; x < count - ends; x++) {
-    const float better = std::clamp (
-        float (row[x]) - float (int (made[x]) - int (truth[x])) * scale, 0.0f,
-        float (largest - 1));
-    row[x] = row[x] < largest ? Pixel (better + 0.5f) : row[x];
-  }
-}
-
-} // namespace
 
 template <typename Pixel>
 Result<void>
@@ -532,8 +487,8 @@ try {
       mirrors.width, std::min (expected.height, mirrors.height)));
   if (largest <= 0)
     largest = std::numeric_limits<Pixel>::max ();
-  const auto light =
-      scaled_light<Pixel> (expected, ImageView<const Pixel> (to), largest);
+  const auto light = rectify::scaled_light<Pixel> (
+      expected, ImageView<const Pixel> (to), largest);
   Image<std::uint16_t> seen (camera.width, camera.height);
   sight->run (kernels, light.view (), seen.view (), workers);
   const ImageView<const std::uint16_t> view = std::as_const (seen).view ();
@@ -541,14 +496,14 @@ try {
       view.row (0), view.stride, view.width};
   const auto roughness = measure (view, &workers);
   const rectify::Filters with =
-      filters_for (int (kWideWhite), roughness.get ());
+      filters_for (int (rectify::kWideWhite), roughness);
   workers.run (std::max (expected.height - 2 * reach, 0), [&] (int row, int) {
     const int y = reach + row;
     std::vector<std::uint16_t> made (std::size_t (mirrors.width));
     run_row<std::uint16_t> () (source, places.view ().row (y), mirrors.width,
         with, made.data (), nullptr);
-    take_off (made.data (), light.view ().row (y), mirrors.width, reach,
-        largest, to.row (y));
+    rectify::take_off (made.data (), light.view ().row (y), mirrors.width,
+        reach, largest, to.row (y));
   });
   return {};
 } catch (const std::bad_alloc &) {

@@ -62,8 +62,9 @@ struct RectifyReport {
  *
  * Weights are made once, for fractions of a pixel; along the borders of
  * regions, where pixels mix two codes, for each mirror. run () is const, can be
- * called from several threads, and allocates four bytes for each pixel of the
- * camera around which weights are used.
+ * called from several threads, and keeps four bytes for each pixel of the camera
+ * around which weights are used; besides, it allocates a few bytes at most, and
+ * with keep_unknown a byte for each row of the camera.
  */
 class Rectifier
 {

@@ -127,10 +127,11 @@ Live::add_fused (Job &job, GstElement *tee, std::vector<Chain> &panes) const
     set_if (settings, "mapping", decode_.mapping);
     set_if (settings, "full-well", source_.full_well);
     set_if (settings, "read-noise", source_.read_noise);
-    branch ("fusing").to ("codedexposure-fuse", settings);
+    job.hurried.push_back (
+        branch ("fusing").to ("codedexposure-fuse", settings).last ());
   }
   if (second_)
-    branch ("adding").to ("codedexposure-sum");
+    job.hurried.push_back (branch ("adding").to ("codedexposure-sum").last ());
 }
 
 /* Frames of both cameras go to what needs both before they are split. */

@@ -83,6 +83,9 @@ struct Job {
   std::vector<GstElement *> recorders;
   /** If the recording behind the only buffer fails, the rest goes on. */
   bool buffer_may_fail = false;
+  /** Elements of a display behind leaky queues: what they miss was skipped, and
+   * is not lost. */
+  std::vector<GstElement *> hurried;
   /** A tcpserversink. */
   GstElement *server = nullptr;
   /** Frames begin when the server has a receiver. */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <string>
 
@@ -17,7 +18,8 @@ namespace codedexposure::app
 class LeakyQueue
 {
 public:
-  explicit LeakyQueue (GstElement *queue) : name_ (GST_OBJECT_NAME (queue))
+  explicit LeakyQueue (GstElement *queue)
+      : queue_ (GST_ELEMENT (gst_object_ref (queue)))
   {
     watch_buffers (pad_of (queue, "sink").get (),
         [this] (GstPad *, GstBuffer *) { in_++; });
@@ -27,14 +29,29 @@ public:
   LeakyQueue (const LeakyQueue &) = delete;
   LeakyQueue &operator= (const LeakyQueue &) = delete;
 
+  bool is_before (const GstElement *element) const
+  {
+    const gst::ObjectPtr<GstPad> next (
+        gst_pad_get_peer (pad_of (queue_.get (), "src").get ()));
+    return next && GST_PAD_PARENT (next.get ()) == element;
+  }
+
+  /** Without those that wait. */
+  gint64 skipped () const
+  {
+    guint waiting = 0;
+    g_object_get (queue_.get (), "current-level-buffers", &waiting, nullptr);
+    return std::max<gint64> (in_ - out_ - waiting, 0);
+  }
+
   std::string counters () const
   {
     return format ("%s: in=%" G_GINT64_FORMAT " skipped=%" G_GINT64_FORMAT,
-        name_.c_str (), in_.load (), in_.load () - out_.load ());
+        GST_OBJECT_NAME (queue_.get ()), in_.load (), skipped ());
   }
 
 private:
-  std::string name_;
+  gst::ObjectPtr<GstElement> queue_; // it may leave the pipeline
   std::atomic<gint64> in_ = 0, out_ = 0;
 };
 

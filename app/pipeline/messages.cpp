@@ -449,7 +449,8 @@ counters_of (const std::vector<GstElement *> &elements, const char *counter)
 }
 
 std::string
-flaws_of (GstElement *pipeline, const std::vector<GstElement *> &recorders)
+flaws_of (GstElement *pipeline, const std::vector<GstElement *> &recorders,
+    const std::vector<GstElement *> &hurried)
 {
   constexpr struct {
     const char *counter, *text, *text_of_one = text;
@@ -460,11 +461,13 @@ flaws_of (GstElement *pipeline, const std::vector<GstElement *> &recorders)
   std::string text;
   for (const auto &[counter, text_of_many, text_of_one] : kFlaws) {
     guint64 most = 0;
-    if (!recorders.empty () && std::string_view (counter) == "frames-lost")
+    const bool loss = std::string_view (counter) == "frames-lost";
+    if (loss && !recorders.empty ())
       most = counters_of (recorders, counter);
     else
       each_element (pipeline, [&] (GstElement *element) {
-        most = std::max (most, counter_of (element, counter));
+        if (!loss || !std::ranges::count (hurried, element))
+          most = std::max (most, counter_of (element, counter));
       });
     if (most > 0)
       text += format (", %" G_GUINT64_FORMAT " %s", most,

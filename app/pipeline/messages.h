@@ -70,10 +70,11 @@ guint64 counters_of (
 /** ", 3 lost, 1 corrupted": coded frames of @p pipeline, from the largest
  * counters of its elements, of which several count the same frames; empty:
  * none.
- * @p recorders  count those that are lost, whatever a display loses; if there
- * are none, any. */
-std::string flaws_of (
-    GstElement *pipeline, const std::vector<GstElement *> &recorders);
+ * @p recorders  count those that are lost; if there are none, any element does
+ * but those that are @p hurried. */
+std::string flaws_of (GstElement *pipeline,
+    const std::vector<GstElement *> &recorders,
+    const std::vector<GstElement *> &hurried);
 
 /** "name: counter=value ...": the counters in the property stats of an element
  * of this plugin (without stats: its read-only numbers), or the shown and late

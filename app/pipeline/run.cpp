@@ -2,10 +2,13 @@
 /* Plays a pipeline: signals, progress and errors. */
 #include "run.h"
 
+#include <algorithm>
 #include <csignal>
 #include <utility>
 
 #include <glib-unix.h>
+
+#include "common/messages.h"
 
 namespace codedexposure::app
 {
@@ -348,6 +351,10 @@ Run::on_element_message (const GstStructure *structure, GstMessage *message)
       (name.starts_with ("codedexposure/") || name.starts_with ("dmdsync/") ||
           name.starts_with ("moirecalib/")))
     status_.line (fields_of (message));
+  if (name == gst::FramesLost::kName &&
+      std::ranges::count (
+          job_.hurried, GST_ELEMENT (GST_MESSAGE_SRC (message))))
+    return;
   const std::string text = notice (structure);
   if (!text.empty () && std::exchange (noticed_, text) != text)
     status_.line (text);
@@ -440,7 +447,7 @@ Run::tick ()
   if (!counter_ || frames == 0 || job_.is_moved_in)
     return;
   if (job_.window) {
-    const std::string flaws = flaws_of (pipeline (), job_.recorders);
+    const std::string flaws = this->flaws ();
     job_.window->tell (
         coded_frames (guint64 (frames)) +
             (flaws.empty () ? ", none lost or corrupted" : flaws),

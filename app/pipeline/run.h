@@ -61,6 +61,7 @@ private:
   void print_result (const std::string &flaws, const std::string &wrote);
   void print_json (Exit exit, const std::string &flaws) const;
   void print_counters ();
+  std::string flaws () const;
   gint64 frames () const { return counter_ ? counter_->frames ().load () : 0; }
 
   /* Only the same signal again is another one: what starts this program may

@@ -49,12 +49,24 @@ Run::publish ()
   return errors.empty ();
 }
 
+std::string
+Run::flaws () const
+{
+  std::string text = flaws_of (pipeline (), job_.recorders, job_.hurried);
+  for (const auto &queue : leaky_queues_)
+    for (GstElement *element : job_.hurried)
+      if (queue->is_before (element) && queue->skipped () > 0)
+        text += format (", %" G_GINT64_FORMAT " skipped by %s",
+            queue->skipped (), GST_OBJECT_NAME (element));
+  return text;
+}
+
 RunResult
 Run::finish ()
 {
   if (job_.options.verbose && frames () > 0)
     print_counters ();
-  const std::string flaws = flaws_of (pipeline (), job_.recorders);
+  const std::string flaws = this->flaws ();
   if (job_.counted) {
     not_coded_ = counter_of (job_.counted, "frames-not-coded");
     lost_ = counter_of (job_.counted, "frames-lost");

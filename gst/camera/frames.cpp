@@ -150,23 +150,23 @@ set_time (GstCodedExposureCameraSrc *self, GstBuffer *frame)
   stream.last = GST_CLOCK_TIME_IS_VALID (now) ? now : 0;
 }
 
-/* An incomplete frame stays as it is, apart from its memory: what it lacks is
- * for downstream to judge. */
+/* A frame that is incomplete, or for whose pixels there is no memory, stays as
+ * it is, in memory of its own: what it lacks is for downstream to judge. */
 BufferPtr
 own (const Stream &stream, BufferPtr frame)
 {
   const OwnedFrames &frames = *stream.frames;
-  if (!frames.is_whole (frame.get ())) {
+  BufferPtr owned =
+      frames.is_whole (frame.get ()) ? frames.own (frame.get ()) : nullptr;
+  if (!owned) {
     BufferPtr copy (gst_buffer_copy_deep (frame.get ()));
     GST_BUFFER_FLAG_SET (copy.get (), GST_BUFFER_FLAG_CORRUPTED);
     return copy;
   }
-  BufferPtr owned = frames.own (frame.get ());
   FrameMeta meta;
   meta.bits = frames.bits ();
   meta.exposure_duration = stream.exposure;
-  if (owned &&
-      (meta.bits > 0 || GST_CLOCK_TIME_IS_VALID (meta.exposure_duration)))
+  if (meta.bits > 0 || GST_CLOCK_TIME_IS_VALID (meta.exposure_duration))
     set_frame_meta (owned.get (), meta);
   return owned;
 }
@@ -186,8 +186,6 @@ take_item (GstPad *, GstPadProbeInfo *info, gpointer data)
     return GST_PAD_PROBE_OK;
   BufferPtr frame = own (stream, BufferPtr (GST_PAD_PROBE_INFO_BUFFER (info)));
   info->data = frame.get ();
-  if (!frame)
-    return GST_PAD_PROBE_HANDLED;
   set_time (self, frame.release ());
   return GST_PAD_PROBE_OK;
 }

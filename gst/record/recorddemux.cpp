@@ -198,23 +198,27 @@ salvages (gpointer self)
   return state_in<Self> (self).salvage;
 }
 
-/* A demuxer passes over some bytes of a head without reading them. */
-void
+/* A demuxer passes over some bytes of a head without reading them. Returns what
+ * is wrong; null: nothing. */
+const char *
 read_head (RecordDemuxState &state, guint64 at, GstBuffer *bytes)
 {
   constexpr gsize kLongestHead = 1 << 20;
   Stream &stream = state.stream;
   const gsize size = gst_buffer_get_size (bytes);
   if (stream.head || at >= kLongestHead)
-    return;
+    return nullptr;
   const gsize part = std::min (size, gsize (kLongestHead - at));
   stream.begin.resize (std::max (stream.begin.size (), at + part));
   gst_buffer_extract (bytes, 0, stream.begin.data () + at, part);
   stream.head = matroska_head (stream.begin);
-  if (stream.head) {
-    state.coded.set_tick (stream.head->tick);
-    stream.begin.clear ();
-  }
+  if (!stream.head)
+    return nullptr;
+  stream.begin.clear ();
+  if (stream.head->tick == 0)
+    return MatroskaHead::kNoTick;
+  state.coded.set_tick (stream.head->tick);
+  return nullptr;
 }
 
 /* A demuxer collects an element of any length that a stream claims. */
@@ -227,16 +231,18 @@ on_bytes (GstPad *, GstPadProbeInfo *info, gpointer self) noexcept
   GstBuffer *bytes = GST_PAD_PROBE_INFO_BUFFER (info);
   const gsize size = gst_buffer_get_size (bytes);
   const bool pulled = GST_PAD_PROBE_INFO_TYPE (info) & GST_PAD_PROBE_TYPE_PULL;
-  read_head (state, pulled ? info->offset : stream.pushed, bytes);
+  const char *why =
+      read_head (state, pulled ? info->offset : stream.pushed, bytes);
   stream.pushed += size;
   if (state.has_new_frame.exchange (false))
     stream.bytes_without_frame = 0;
   stream.bytes_without_frame += size;
-  if (stream.bytes_without_frame <= kMostWithoutFrame)
+  if (!why && stream.bytes_without_frame > kMostWithoutFrame)
+    why = "256 MB arrived without a frame: this is no stream of coded frames, "
+          "or it is damaged.";
+  if (!why)
     return GST_PAD_PROBE_OK;
-  POST_ERROR (self, STREAM, DEMUX,
-      "256 MB arrived without a frame: this is no stream of coded frames, or "
-      "it is damaged.");
+  POST_ERROR (self, STREAM, DEMUX, why);
   gst_clear_buffer (reinterpret_cast<GstBuffer **> (&info->data));
   GST_PAD_PROBE_INFO_FLOW_RETURN (info) = GST_FLOW_ERROR;
   return GST_PAD_PROBE_HANDLED;

@@ -131,7 +131,7 @@ head_of (Source &file, const Element &segment)
       file.each (part, [&] (const Element &value) {
         if (value.id == kTimestampScale)
           head.tick = Nanoseconds (std::clamp<std::uint64_t> (
-              file.number (value), 1, 1'000'000'000));
+              file.number (value), 0, 1'000'000'000));
         return true;
       });
     if (part.id != kTracks)
@@ -328,6 +328,8 @@ recording_info (const std::string &path, bool with_frames)
       !segment || segment->is_open || segment->end > file.size ();
   if (auto head = segment ? head_of (file, *segment) : std::nullopt)
     info.head = *std::move (head);
+  if (info.head.tick == 0)
+    return Error{path + ": " + MatroskaHead::kNoTick, ErrorCode::parse};
   if (info.head.codec == MatroskaHead::Codec::other)
     return Error{path + " has " + info.head.codec_name +
                      ", but coded frames are recorded as FFV1 or raw" + kRemedy,

@@ -26,7 +26,12 @@ struct MatroskaHead {
   /** Bytes of a pixel of raw frames: 1 or 2; 0: their format is not grey. */
   int pixel_bytes = 0;
   Nanoseconds duration = 0;     ///< of a frame; 0: not known
-  Nanoseconds tick = 1'000'000; ///< to which times are rounded
+  Nanoseconds tick = 1'000'000; ///< to which times are rounded; 0: damaged
+  static constexpr const char *kNoTick = "the head of the file is damaged: its "
+                                         "TimestampScale is 0 ns, so that all "
+                                         "frames have the same time; write 1, "
+                                         "which recordings have, into the byte "
+                                         "behind 2A D7 B1 81";
   /** Numbers of the tracks of frames and of their lines; 0: there is none. */
   std::uint64_t video = 0, lines = 0;
   /** Frames of a second camera, if the file has a second track of lines, too.

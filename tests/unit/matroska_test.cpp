@@ -122,6 +122,18 @@ TEST (Matroska, TheHeadOfAFileThatWasCutOffHasTheFormat)
     EXPECT_FALSE (matroska_head (unfinished.substr (0, length))) << length;
 }
 
+TEST (Matroska, TheHeadOfAFileWithoutTicksIsDamaged)
+{
+  std::string bytes = head (kNoSize) + "\x1f\x43\xb6\x75" + kNoSize;
+  const auto scale = bytes.find ("\x2a\xd7\xb1");
+  bytes.replace (scale + 4, 2, "\0\0"s);
+  const auto info = read (bytes);
+  ASSERT_FALSE (info);
+  EXPECT_NE (info.error ().message.find ("its TimestampScale is 0"),
+      std::string::npos)
+      << info.error ().message;
+}
+
 TEST (Matroska, FramesAreFoundWithTheirTimesAndTheSetup)
 {
   const StreamSetup setup = {*Schedule::parse ("staircase:2x2")};

@@ -230,15 +230,19 @@ class Plan:
 
     @staticmethod
     def from_json(fields):
+        unreadable = Problem('the plan of this archive cannot be read')
         if not fields or fields.get('format') != FORMAT:
-            raise Problem('the plan of this archive cannot be read')
-        if fields['version'] != VERSION:
-            raise Problem(f'this archive has version {fields["version"]}; '
+            raise unreadable
+        if fields.get('version') != VERSION:
+            raise Problem(f'this archive has version {fields.get("version")}; '
                           f'this program reads {VERSION}')
         fields = {k: v for k, v in fields.items() if k not in (
             'format', 'version')}
-        fields['recordings'] = [Recording(**r) for r in fields['recordings']]
-        return Plan(**fields)
+        try:
+            fields['recordings'] = [Recording(**r) for r in fields['recordings']]
+            return Plan(**fields)
+        except (KeyError, TypeError) as error:
+            raise unreadable from error
 
 
 def beside(output, ending):

@@ -63,25 +63,8 @@ big_endian (std::string_view bytes)
 std::string
 escaped (std::string_view text)
 {
-  std::string safe;
-  for (const char c : text)
-    switch (c) {
-    case '&':
-      safe += "&amp;";
-      break;
-    case '<':
-      safe += "&lt;";
-      break;
-    case '>':
-      safe += "&gt;";
-      break;
-    case '"':
-      safe += "&quot;";
-      break;
-    default:
-      safe += c;
-    }
-  return safe;
+  const CharPtr valid (g_utf8_make_valid (text.data (), gssize (text.size ())));
+  return CharPtr (g_markup_escape_text (valid.get (), -1)).get ();
 }
 
 std::string

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "graph.h"
 
-#include "base/text.h"
 #include "failure.h"
 #include "pipeline/messages.h"
 
@@ -9,12 +8,6 @@ namespace codedexposure::app
 {
 
 using namespace gst;
-
-std::string
-property_text (double value)
-{
-  return real_text (value);
-}
 
 Graph::Graph ()
     : pipeline_ (GST_ELEMENT (gst_object_ref_sink (gst_pipeline_new (nullptr))))

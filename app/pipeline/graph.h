@@ -13,39 +13,26 @@
 
 #include <gst/gst.h>
 
+#include "base/text.h"
 #include "common/raii.h"
 
 namespace codedexposure::app
 {
 
-/** The text of a property's value, as gst-launch-1.0 takes it, in the C
- * locale. */
-std::string property_text (double value);
-
 /** A property of an element and its value. */
 struct Setting {
-  Setting (const char *property, std::string text)
-      : name (property), value (std::move (text))
+  /** @p given  as gst-launch-1.0 takes it, in the C locale. */
+  template <typename Value>
+  Setting (const char *property, const Value &given) : name (property)
   {
-  }
-  Setting (const char *property, const char *text)
-      : name (property), value (text)
-  {
-  }
-  Setting (const char *property, bool on)
-      : name (property), value (on ? "true" : "false")
-  {
-  }
-  template <typename Number>
-  requires std::is_arithmetic_v<Number> Setting (
-      const char *property, Number number)
-      : name (property), value ([number] {
-          if constexpr (std::is_integral_v<Number>)
-            return std::to_string (number);
-          else
-            return property_text (number);
-        }())
-  {
+    if constexpr (std::is_same_v<Value, bool>)
+      value = given ? "true" : "false";
+    else if constexpr (std::is_integral_v<Value>)
+      value = std::to_string (given);
+    else if constexpr (std::is_floating_point_v<Value>)
+      value = real_text (given);
+    else
+      value = given;
   }
 
   const char *name;

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include <fcntl.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "failure.h"
@@ -116,17 +115,6 @@ inputs_of (GstElement *pipeline)
   return inputs;
 }
 
-/* What @path is, by device and inode; none: it does not exist. */
-std::optional<std::pair<std::uintmax_t, std::uintmax_t>>
-identity_of (const fs::path &path)
-{
-  struct stat known = {};
-  if (stat (path.c_str (), &known) != 0)
-    return std::nullopt;
-  return std::pair (
-      std::uintmax_t (known.st_dev), std::uintmax_t (known.st_ino));
-}
-
 } // namespace
 
 Result<void>
@@ -135,16 +123,13 @@ check_is_no_input (
 {
   std::error_code ignored;
   for (const std::string &input : inputs) {
-    const auto read = identity_of (input);
-    if (!read)
-      continue;
-    if (identity_of (output) == read)
+    if (fs::equivalent (output, input, ignored))
       return Error{output + " is the input; use another name for the output"};
     /* Pictures replace a folder, and the input may be in it. */
     if (fs::is_directory (output, ignored))
       for (fs::path above = fs::absolute (input, ignored).parent_path ();;
            above = above.parent_path ()) {
-        if (identity_of (above) == identity_of (output))
+        if (fs::equivalent (above, output, ignored))
           return Error{output + " holds the input " + input +
                        "; use another folder for the output"};
         if (above == above.parent_path ())

@@ -114,7 +114,8 @@ Run::print_result (const std::string &flaws, const std::string &wrote)
 {
   const bool whole =
       exit_ == Exit::done && (job_.ends_by_signal || !interrupted_);
-  if (!job_.has_result || (!counter_ && wrote.empty ()))
+  const bool in_vain = exit_ == Exit::failed && !job_.outputs.empty ();
+  if (!job_.has_result || (wrote.empty () && (in_vain || !counter_)))
     return;
   std::string text;
   if (counter_)

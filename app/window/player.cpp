@@ -353,9 +353,9 @@ Player::export_command (const State &state)
     const Nanoseconds own = positions[std::size_t (frame)];
     return frame == 0 ? own : (positions[std::size_t (frame) - 1] + own) / 2;
   };
-  std::string excerpt = property_text (seconds_of (before (from))) + "-";
+  std::string excerpt = real_text (seconds_of (before (from))) + "-";
   if (until < last ())
-    excerpt += property_text (seconds_of (before (until + 1)));
+    excerpt += real_text (seconds_of (before (until + 1)));
   const std::string stem =
       std::filesystem::path (played_.recording).stem ().string () +
       format ("-%.3f-%.3fs", seconds_of (played_.positions[std::size_t (from)]),

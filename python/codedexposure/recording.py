@@ -16,7 +16,7 @@ from .frame import Frame, frame_of, position_of, shows_pattern
 from .frames import Frames
 
 _NOT_OF_SCHEDULE = ("mapping", "size", "rate", "bits", "track", "simulated",
-                    "bench", "partner")
+                    "bench", "partner", "beam")
 
 
 def open(path: str | os.PathLike) -> Recording:  # pylint: disable=W0622

@@ -192,6 +192,7 @@ class TwoCameras(unittest.TestCase):
             "--output", "both.mkv")
         play("filesrc location=both.mkv ! matroskademux ! avdec_ffv1 ! "
              "filesink location=both.raw")
+        self.assertEqual(opened("second.mkv").schedule, opened("first.mkv").schedule)
         frames = opened("first.mkv").fused("fast", second=SCRATCH / "second.mkv")
         self.assertEqual(b"".join(frame.image.tobytes() for frame in frames),
                          (SCRATCH / "both.raw").read_bytes())

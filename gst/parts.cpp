@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "parts.h"
 
-#include "bench/simulated_dmd.h"
 #include "common/elements.h"
 #include "common/meta.h"
 #include "common/partner.h"
@@ -16,7 +15,6 @@ register_elements (GstPlugin *plugin)
 {
   register_meta (kFrameMetaName);
   register_partner_meta ();
-  serve_simulated_dmds ();
   return GST_ELEMENT_REGISTER (codedexposure_demux, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_filesink, plugin) &&
          GST_ELEMENT_REGISTER (codedexposure_keep, plugin) &&

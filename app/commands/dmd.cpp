@@ -10,7 +10,6 @@
 
 #include "base/text.h"
 #include "base/wait.h"
-#include "bench/simulated_dmd.h"
 #include "command.h"
 #include "dmd/stop_guard.h"
 #include "dmd/usb_bus.h"
@@ -287,7 +286,6 @@ Exit
 run_command (Arguments &arguments, Exit (*run) (const Arguments &))
 {
   name_this_program ();
-  serve_simulated_dmds ();
   arguments.stop = stop_at_signals ();
   try {
     return run (arguments);

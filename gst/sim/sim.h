@@ -14,11 +14,11 @@
 #include "base/result.h"
 #include "bench/bench.h"
 #include "bench/light_share.h"
-#include "bench/simulated_dmd.h"
 #include "common/beam.h"
 #include "common/element.h"
 #include "common/named.h"
 #include "common/raii.h"
+#include "dmd/simulated_dmd.h"
 #include "schedule/schedule.h"
 #include "setup/stream_setup.h"
 

@@ -1,60 +1,24 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "dmd/dmd.h"
 
-#include <algorithm>
-#include <mutex>
-
 #include "base/try.h"
 #include "dmd/drivers.h"
 
 namespace codedexposure
 {
 
-namespace
-{
-
-std::mutex schemes_lock;
-
-/** Guarded by schemes_lock. */
-std::vector<DmdScheme> &
-schemes ()
-{
-  static std::vector<DmdScheme> known = board_schemes ();
-  return known;
-}
-
-std::vector<DmdScheme>
-list_schemes ()
-{
-  const std::lock_guard guard (schemes_lock);
-  return schemes ();
-}
-
-} // namespace
-
 Result<std::unique_ptr<Dmd>>
 open_dmd (std::string_view device)
 {
   std::string known;
-  for (const DmdScheme &scheme : list_schemes ()) {
+  for (const DmdScheme &scheme : dmd_schemes ()) {
     if (device.starts_with (scheme.prefix))
       return scheme.open (device);
-    known += (known.empty () ? "" : ", ") + scheme.usage;
+    known += std::string (known.empty () ? "" : ", ") + scheme.usage;
   }
   return Error{"no driver serves the DMD '" + std::string (device) +
                    "'; devices are " + known,
       ErrorCode::not_found};
-}
-
-void
-add_dmd_scheme (const DmdScheme &scheme)
-{
-  const std::lock_guard guard (schemes_lock);
-  auto &known = schemes ();
-  if (std::none_of (known.begin (), known.end (), [&] (const DmdScheme &other) {
-        return other.prefix == scheme.prefix;
-      }))
-    known.insert (known.begin (), scheme);
 }
 
 Result<void>

@@ -117,12 +117,10 @@ Result<std::unique_ptr<Dmd>> open_dmd (std::string_view device);
 
 /** How devices are opened whose names begin with prefix. */
 struct DmdScheme {
-  std::string prefix; ///< "usb:"
-  std::string usage;  ///< for people
+  const char *prefix; ///< "usb:"
+  const char *usage;  ///< for people
   Result<std::unique_ptr<Dmd>> (*open) (std::string_view device);
 };
-/** Adds a scheme to open_dmd (). Thread-safe. */
-void add_dmd_scheme (const DmdScheme &scheme);
 
 /** Whether the device can hold the masks of @p schedule. */
 Result<void> check_masks (const DmdInfo &info, const Schedule &schedule);

@@ -13,8 +13,8 @@
 namespace codedexposure
 {
 
-/** The devices that these drivers open, by their names. */
-std::vector<DmdScheme> board_schemes ();
+/** The devices that can be opened, by their names. */
+std::vector<DmdScheme> dmd_schemes ();
 
 /**
  * Opens the LightCrafter 4500 behind @p link. The board continues with what it

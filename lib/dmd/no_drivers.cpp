@@ -2,6 +2,8 @@
 /* In a build of what the demo needs: boards have names, but no drivers. */
 #include "dmd/drivers.h"
 
+#include "dmd/simulated_dmd.h"
+
 namespace codedexposure
 {
 
@@ -20,9 +22,10 @@ refuse (std::string_view device)
 } // namespace
 
 std::vector<DmdScheme>
-board_schemes ()
+dmd_schemes ()
 {
-  return {{"usb:", "usb:[PORT|SERIAL] (not in this build)", refuse},
+  return {kSimulatedDmds,
+      {"usb:", "usb:[PORT|SERIAL] (not in this build)", refuse},
       {"lightcrafter:", "lightcrafter:[ADDRESS[:PORT]] (not in this build)",
           refuse}};
 }

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include "bench/simulated_dmd.h"
+#include "dmd/simulated_dmd.h"
 #include "sync_bench.h"
 
 namespace

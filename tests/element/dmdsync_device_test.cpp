@@ -8,7 +8,7 @@
 
 #include <gst/base/gstbasesrc.h>
 
-#include "bench/simulated_dmd.h"
+#include "dmd/simulated_dmd.h"
 #include "sync_harness.h"
 
 namespace

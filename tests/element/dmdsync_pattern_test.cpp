@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <array>
 
-#include "bench/simulated_dmd.h"
 #include "calibrate/gratings.h"
+#include "dmd/simulated_dmd.h"
 #include "sync_bench.h"
 
 namespace

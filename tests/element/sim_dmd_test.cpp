@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-sim with a simulated DMD that the test controls. */
-#include "bench/simulated_dmd.h"
+#include "dmd/simulated_dmd.h"
 #include "mirrors.h"
 #include "sim_harness.h"
 

@@ -2,10 +2,10 @@
 /* Any bytes as the short texts of properties and command lines: what is
  * accepted is written so that it parses back. */
 #include "base/packed_mono.h"
-#include "emulation/fault_plan.h"
-#include "bench/simulated_dmd.h"
 #include "calibrate/gratings.h"
 #include "dmd/options.h"
+#include "dmd/simulated_dmd.h"
+#include "emulation/fault_plan.h"
 #include "fuzz_check.h"
 #include "schedule/mirror_array.h"
 #include "stats/profile_line.h"

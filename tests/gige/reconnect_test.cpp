@@ -5,9 +5,9 @@
 #include <condition_variable>
 #include <mutex>
 
-#include "bench/simulated_dmd.h"
 #include "camera_process.h"
 #include "camera_rig.h"
+#include "dmd/simulated_dmd.h"
 
 namespace
 {

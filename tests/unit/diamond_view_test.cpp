@@ -6,9 +6,9 @@
 #include <gtest/gtest.h>
 
 #include "bench/bench.h"
-#include "bench/simulated_dmd.h"
 #include "diamond.h"
 #include "dmd/plane_image.h"
+#include "dmd/simulated_dmd.h"
 #include "mirrors.h"
 
 using namespace codedexposure;

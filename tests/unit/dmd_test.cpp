@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "bench/simulated_dmd.h"
 #include "dmd/dmd.h"
+#include "dmd/simulated_dmd.h"
 
 using namespace codedexposure;
 
@@ -163,17 +163,11 @@ TEST (SimulatedMirrors, AreSharedByNameWhileSomebodyHoldsThem)
   EXPECT_FALSE (SimulatedMirrors::find ("brief")->schedule ());
 }
 
-class OpenDmd : public ::testing::Test
-{
-protected:
-  void SetUp () override { serve_simulated_dmds (); }
-};
-
-class SimulatedDmd : public OpenDmd
+class SimulatedDmd : public ::testing::Test
 {
 };
 
-TEST_F (OpenDmd, NamesTheDevicesThereAre)
+TEST (OpenDmd, NamesTheDevicesThereAre)
 {
   const auto opened = open_dmd ("tape:1-2");
   ASSERT_FALSE (opened);
@@ -181,7 +175,7 @@ TEST_F (OpenDmd, NamesTheDevicesThereAre)
   EXPECT_NE (opened.error ().message.find ("sim:NAME"), std::string::npos);
 }
 
-TEST_F (OpenDmd, TellsWhichOptionCannotBeUsed)
+TEST (OpenDmd, TellsWhichOptionCannotBeUsed)
 {
   for (const char *bad :
       {"sim:", "sim:,size=2x2", "sim:b,size=2", "sim:b,size=0x3",
@@ -195,7 +189,7 @@ TEST_F (OpenDmd, TellsWhichOptionCannotBeUsed)
   }
 }
 
-TEST_F (OpenDmd, ReadsTheOptionsOfASimulatedDevice)
+TEST (OpenDmd, ReadsTheOptionsOfASimulatedDevice)
 {
   const auto dmd = open_dmd ("sim:options,size=1920x1080,masks=400,"
                              "min-active=105us,min-switching=20us");

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "bench/bench.h"
-#include "bench/simulated_dmd.h"
+#include "dmd/simulated_dmd.h"
 #include "scenes.h"
 #include "sync/phase_lock.h"
 #include "sync/phase_watch.h"

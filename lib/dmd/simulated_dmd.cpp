@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "bench/simulated_dmd.h"
+#include "dmd/simulated_dmd.h"
 
 #include <chrono>
 #include <map>
@@ -316,12 +316,6 @@ open_simulated_dmd (std::string_view device)
         ErrorCode::device};
   return std::unique_ptr<Dmd> (
       std::make_unique<SimulatedDmd> (std::move (options)));
-}
-
-void
-serve_simulated_dmds ()
-{
-  add_dmd_scheme ({"sim:", "sim:NAME (a simulated DMD)", open_simulated_dmd});
 }
 
 } // namespace codedexposure

@@ -157,7 +157,7 @@ private:
  *   fail=open|upload|start|restart  what fails
  */
 Result<std::unique_ptr<Dmd>> open_simulated_dmd (std::string_view device);
-/** From now on, open_dmd () opens them, too. */
-void serve_simulated_dmds ();
+inline constexpr DmdScheme kSimulatedDmds{
+    "sim:", "sim:NAME (a simulated DMD)", open_simulated_dmd};
 
 } // namespace codedexposure

@@ -379,7 +379,8 @@ Decode::run ()
                               "front to back");
     result = play_once (true, found);
   }
-  if (info.is_cut_short && result.exit == Exit::failed && result.frames == 0)
+  if ((info.is_cut_short || info.is_open) && result.exit == Exit::failed &&
+      result.frames == 0)
     fail (recording_ + " is cut off and has no complete frame to decode");
   if (info.is_cut_short && result.exit == Exit::done)
     result.exit = Exit::damaged;

@@ -59,7 +59,7 @@ read_recording (Job &job, const std::string &file)
 {
   job.source = file;
   const auto info = recording_info (file, false);
-  job.is_finished = info && !info->is_cut_short;
+  job.is_finished = info && !info->is_cut_short && !info->is_open;
   Chain chain = job.graph.begin ("filesrc", {{"location", file}});
   chain.to ("codedexposure-recorddemux", {{"salvage", job.salvage}});
   job.reader = chain.last ();

@@ -9,6 +9,7 @@
 #include <glib-unix.h>
 
 #include "common/messages.h"
+#include "record/matroska.h"
 
 namespace codedexposure::app
 {
@@ -324,6 +325,19 @@ Run::on_error (GstMessage *message)
   end_after_error (source);
 }
 
+namespace
+{
+
+/* Of a recording that is cut off: whether frames may follow its damage. */
+bool
+has_damage_within (const std::string &recording)
+{
+  const auto info = recording_info (recording);
+  return info && info->is_damaged;
+}
+
+} // namespace
+
 /* Losses are warnings; all messages of this plugin are for --verbose. */
 void
 Run::on_element_message (const GstStructure *structure, GstMessage *message)
@@ -341,7 +355,8 @@ Run::on_element_message (const GstStructure *structure, GstMessage *message)
     return;
   /* A demuxer takes the length that damage claims, which may be all the rest.
    */
-  if (name == "codedexposure/stream-cut" && job_.is_finished && !job_.salvage) {
+  if (name == "codedexposure/stream-cut" && !job_.salvage &&
+      (job_.is_finished || has_damage_within (job_.source))) {
     container_damaged_ = true;
     end (Exit::failed);
     return;

@@ -115,6 +115,24 @@ Part::claim (bool replace)
   return {};
 }
 
+/* What a user has put into the folder that was replaced. */
+Result<void>
+Part::keep_others ()
+{
+  std::error_code failed, ignored;
+  for (const auto &entry : fs::directory_iterator (path_, failed)) {
+    const fs::path kept = fs::path (name_) / entry.path ().filename ();
+    if (!failed && !fs::exists (fs::symlink_status (kept, ignored)))
+      fs::rename (entry, kept, failed);
+  }
+  if (failed)
+    return Error{"cannot move what " + name_ + " held besides: " +
+                     failed.message () + "; it is in " + path_,
+        ErrorCode::io};
+  discard ();
+  return {};
+}
+
 Result<void>
 Part::publish (bool replace)
 {
@@ -125,10 +143,8 @@ Part::publish (bool replace)
   /* A folder takes no other's place, but changes it. */
   if (kind_ == kFolder && replace &&
       renameat2 (AT_FDCWD, path_.c_str (), AT_FDCWD, name_.c_str (),
-          RENAME_EXCHANGE) == 0) {
-    discard ();
-    return {};
-  }
+          RENAME_EXCHANGE) == 0)
+    return keep_others ();
   return move_file (path_, name_, replace);
 }
 

@@ -28,7 +28,7 @@ public:
    * killed is an error if it has content, unless @p replace. */
   Result<void> claim (bool replace);
   /** Gives a file its name; a file of that name is an error, unless @p replace.
-   */
+   * A folder that is replaced keeps what the new one has not. */
   Result<void> publish (bool replace);
   void discard ();
 
@@ -39,6 +39,7 @@ public:
 private:
   bool create ();
   bool lock ();
+  Result<void> keep_others ();
   Error busy () const;
   Error unwritable () const;
 

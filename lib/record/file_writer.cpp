@@ -63,6 +63,11 @@ try {
   if (file < 0)
     return failure (path, errno);
   std::unique_ptr<FileWriter> writer (new FileWriter (path, file, reserve > 0));
+  if (lseek (file, 0, SEEK_CUR) < 0)
+    return Error{"cannot write " + path +
+                     ": it is a pipe, which takes no raw frames; write a file, "
+                     "or record FFV1",
+        ErrorCode::io};
   RETURN_IF_ERROR (reserve_space (path, file, reserve));
   return writer;
 } catch (const std::exception &error) {

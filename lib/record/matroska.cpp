@@ -324,18 +324,22 @@ recording_info (const std::string &path, bool with_frames)
     return Error{path + " is not a Matroska file" + kRemedy, ErrorCode::parse};
   const auto segment = segment_of (file);
   RecordingInfo info;
-  info.is_cut_short =
-      !segment || segment->is_open || segment->end > file.size ();
+  info.is_open = segment && segment->is_open;
   if (auto head = segment ? head_of (file, *segment) : std::nullopt)
     info.head = *std::move (head);
+  info.is_cut_short = !segment || (info.is_open ? info.head.lines == 0
+                                                : segment->end > file.size ());
   if (info.head.tick == 0)
     return Error{path + ": " + MatroskaHead::kNoTick, ErrorCode::parse};
   if (info.head.codec == MatroskaHead::Codec::other)
     return Error{path + " has " + info.head.codec_name +
                      ", but coded frames are recorded as FFV1 or raw" + kRemedy,
         ErrorCode::parse};
-  if (segment && with_frames)
+  if (segment && with_frames) {
     read_blocks (file, *segment, info);
+    if (info.is_open)
+      info.is_cut_short = info.recorded != info.times.size ();
+  }
   return info;
 }
 

@@ -53,7 +53,11 @@ std::optional<MatroskaHead> matroska_head (std::string_view bytes);
 /** A recording of coded frames. */
 struct RecordingInfo {
   MatroskaHead head;
-  /** It was not finished, or is shorter than when it was. */
+  /** Its head has no length: it was not finished, or went through a pipe. */
+  bool is_open = false;
+  /** It is shorter than its head says; one that is open: it has no lines, or
+   * its last line is missing or counts other frames, which is only known if
+   * they were read. */
   bool is_cut_short = false;
   /** Something between its frames is no part of a recording. Only known if
    * the frames were read. */

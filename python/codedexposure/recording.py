@@ -175,17 +175,14 @@ class Recording:
                               for codec in codecs):
             raise Error(f"{self.path} has {codecs[0].decode()}, but coded "
                         "frames are recorded as FFV1 or raw")
-        self._cut = self._is_cut_short(head)
-
-    def _is_cut_short(self, head: bytes) -> bool:
-        """Whether the file is shorter than its header says. The header of a
-        file that was not finished has no size."""
         at = head.find(b"\x18\x53\x80\x67", 0, 4096)
         size = head[at + 4:at + 12]
-        if at < 0 or len(size) < 8 or size[0] != 1:
-            return True
-        return (at + 12 + int.from_bytes(size[1:], "big")
-                > os.path.getsize(self.path))
+        # One that was not finished, or went through a pipe, says no length.
+        self._open = at < 0 or len(size) < 8 or size[0] != 1
+        # It is shorter than its head says, or ended without its last line.
+        self._cut = (b"S_TEXT/UTF8" not in head if self._open else
+                     at + 12 + int.from_bytes(size[1:], "big")
+                     > os.path.getsize(self.path))
 
     def _description(self, decoder: str, salvage: bool,
                      decode: bool = True) -> str:
@@ -207,8 +204,9 @@ class Recording:
                         if last is None or frame.time_ns > last or not salvage:
                             last = frame.time_ns
                             yield player, frame
-                    if player.was_cut and not (self._cut or salvage):
+                    if player.was_cut and not (self._cut or self._open or salvage):
                         raise ContainerError("its end was not reached")
+                    self._cut |= player.was_cut
                 break
             except ContainerError as damage:
                 if salvage:
@@ -270,6 +268,6 @@ class Recording:
         return frame, setups[0] if setups else None
 
     def _no_frame(self, damage: Error | None = None) -> Error:
-        if self._cut:
+        if self._cut or self._open:
             return Error(f"{self.path} is cut off and has no complete frame")
         return damage or Error(f"{self.path} has no coded frame")

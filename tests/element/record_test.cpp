@@ -164,8 +164,9 @@ TEST_P (Forms, WhatGoesInComesOutAgain)
       std::string (options).find ("raw") != std::string::npos);
   EXPECT_EQ (info->head.size, (Extent{32, 24}));
   EXPECT_EQ (info->head.tick, 1);
-  EXPECT_EQ (info->is_cut_short,
+  EXPECT_EQ (info->is_open,
       std::string (options).find ("stream") != std::string::npos);
+  EXPECT_FALSE (info->is_cut_short);
   ASSERT_EQ (info->times.size (), std::size_t (kFrames));
   for (std::size_t i = 0; i < info->times.size (); i++) {
     EXPECT_EQ (GstClockTime (info->times[i]),

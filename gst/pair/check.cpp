@@ -39,16 +39,6 @@ grey_view (MappedFrame &mapped)
 
 } // namespace
 
-std::optional<PairStream>
-PairStream::at (GstAggregatorPad *pad, const std::optional<StreamSetup> &setup)
-{
-  const CapsPtr caps (gst_pad_get_current_caps (GST_PAD (pad)));
-  PairStream stream{.info = {}, .setup = setup};
-  if (caps && gst_video_info_from_caps (&stream.info, caps.get ()))
-    return stream;
-  return {};
-}
-
 void
 PairCheck::configure (const PairStream &on, const PairStream &off)
 {

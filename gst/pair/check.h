@@ -4,9 +4,9 @@
 
 #include <optional>
 
-#include <gst/base/gstaggregator.h>
 #include <gst/video/video.h>
 
+#include "common/raii.h"
 #include "setup/stream_setup.h"
 #include "sync/partner_drift.h"
 #include "sync/partner_watch.h"
@@ -14,13 +14,11 @@
 namespace codedexposure::gst
 {
 
-/** One camera: what its stream says. */
+/** One camera: what its stream says of its next frame. The sticky events of the
+ * pad can be those of later frames, which still are in its queue. */
 struct PairStream {
-  /** None: @p pad has no caps yet. */
-  static std::optional<PairStream> at (
-      GstAggregatorPad *pad, const std::optional<StreamSetup> &setup);
-
-  GstVideoInfo info;
+  CapsPtr caps = {};      ///< null: none came yet
+  GstVideoInfo info = {}; ///< of the caps
   std::optional<StreamSetup> setup = {};
 };
 

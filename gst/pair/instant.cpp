@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "pair/instant.h"
 
-#include <gst/video/video.h>
-
 #include "common/element.h"
 #include "common/meta.h"
 
@@ -34,11 +32,9 @@ later_by (const Instant &one, const Instant &other)
 }
 
 GstClockTime
-period_of (GstAggregatorPad *pad, GstBuffer *frame)
+period_of (const GstVideoInfo &info, GstBuffer *frame)
 {
-  const CapsPtr caps (gst_pad_get_current_caps (GST_PAD (pad)));
-  GstVideoInfo info;
-  if (caps && gst_video_info_from_caps (&info, caps.get ()) && info.fps_n > 0)
+  if (info.fps_n > 0)
     return gst_util_uint64_scale (GST_SECOND, info.fps_d, info.fps_n);
   return GST_BUFFER_DURATION_IS_VALID (frame) ? GST_BUFFER_DURATION (frame)
                                               : 40 * GST_MSECOND;
@@ -46,10 +42,10 @@ period_of (GstAggregatorPad *pad, GstBuffer *frame)
 
 Found
 find_partner (GstAggregatorPad *on, GstAggregatorPad *off, GstBuffer *coded,
-    bool late, BufferPtr &partner, std::vector<BufferPtr> &dropped)
+    GstClockTimeDiff slack, bool late, BufferPtr &partner,
+    std::vector<BufferPtr> &dropped)
 {
   const Instant start = instant_of (on, coded);
-  const auto slack = GstClockTimeDiff (period_of (on, coded) / 4);
   while (const BufferPtr next{gst_aggregator_pad_peek_buffer (off)}) {
     const auto late_by = later_by (instant_of (off, next.get ()), start);
     if (late_by && *late_by > slack)

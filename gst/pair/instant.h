@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <gst/base/gstaggregator.h>
+#include <gst/video/video.h>
 
 #include "common/raii.h"
 
@@ -24,14 +25,15 @@ Instant instant_of (GstAggregatorPad *pad, GstBuffer *frame);
 std::optional<GstClockTimeDiff> later_by (
     const Instant &one, const Instant &other);
 
-/** From one frame to the next. */
-GstClockTime period_of (GstAggregatorPad *pad, GstBuffer *frame);
+/** From one frame to the next. @p info: of their caps. */
+GstClockTime period_of (const GstVideoInfo &info, GstBuffer *frame);
 
 enum class Found { kPartner, kNone, kWait };
 /** Takes the partner of @p coded, the next frame of @p on, from @p off, and the
- * frames before it into @p dropped. @p late: no longer waits for it. */
+ * frames before it into @p dropped. @p slack: how far their times may differ.
+ * @p late: no longer waits for it. */
 Found find_partner (GstAggregatorPad *on, GstAggregatorPad *off,
-    GstBuffer *coded, bool late, BufferPtr &partner,
+    GstBuffer *coded, GstClockTimeDiff slack, bool late, BufferPtr &partner,
     std::vector<BufferPtr> &dropped);
 
 GstSegment segment_at (GstAggregatorPad *pad);

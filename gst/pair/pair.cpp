@@ -137,7 +137,7 @@ constexpr PartnerDrift::Shift kUnknown{
 /* What is forgotten at the end of a run. Source pad's streaming thread, which
  * also handles serialized events. */
 struct Run {
-  std::optional<StreamSetup> on_setup, off_setup;
+  PairStream on, off;
   std::vector<EventPtr> due; ///< before the next coded frame
   bool setup_due = false;
   bool check_due = false; ///< a stream is another
@@ -178,10 +178,8 @@ check_of (GstCodedExposurePair *self)
 {
   PairState &st = state (self);
   if (std::exchange (st.check_due, false)) {
-    const auto on = PairStream::at (sink (self, "on"), st.on_setup);
-    const auto off = PairStream::at (sink (self, "off"), st.off_setup);
-    if (on && off)
-      st.check.configure (*on, *off);
+    if (st.on.caps && st.off.caps)
+      st.check.configure (st.on, st.off);
     st.drift.reset ();
   }
   return st.check;
@@ -274,11 +272,11 @@ push_due (GstPad *pad, GstPadProbeInfo *, gpointer data)
   PairState &st = state (self);
   for (EventPtr &event : std::exchange (st.due, {}))
     gst_pad_push_event (pad, event.release ());
-  if (std::exchange (st.setup_due, false) && st.on_setup) {
-    StreamSetup setup = *st.on_setup;
-    if (const auto off = PairStream::at (sink (self, "off"), st.off_setup))
-      setup.partner = off->setup.value_or (StreamSetup ())
-                          .as_partner ({off->info.width, off->info.height});
+  if (std::exchange (st.setup_due, false) && st.on.setup) {
+    StreamSetup setup = *st.on.setup;
+    if (st.off.caps)
+      setup.partner = st.off.setup.value_or (StreamSetup ())
+                          .as_partner ({st.off.info.width, st.off.info.height});
     gst_pad_push_event (pad, setup_to_event (setup));
   }
   return GST_PAD_PROBE_OK;
@@ -300,8 +298,10 @@ aggregate (GstAggregator *aggregator, gboolean late)
   }
   BufferPtr partner;
   std::vector<BufferPtr> dropped;
+  const auto slack =
+      GstClockTimeDiff (period_of (state (self).on.info, head.get ()) / 4);
   const Found found =
-      find_partner (on, off, head.get (), late, partner, dropped);
+      find_partner (on, off, head.get (), slack, late, partner, dropped);
   locked (
       self, [&] { return state (self).counters.dropped += dropped.size (); });
   for (const BufferPtr &frame : dropped)
@@ -317,7 +317,7 @@ aggregate (GstAggregator *aggregator, gboolean late)
     if (!shows_pattern (coded.get ()))
       watch_drift (self, coded.get (), partner.get ());
     coded.reset (gst_buffer_make_writable (coded.release ()));
-    CapsPtr caps (gst_pad_get_current_caps (GST_PAD (off)));
+    CapsPtr caps (gst_caps_ref (state (self).off.caps.get ()));
     set_partner (coded.get (), {std::move (partner), std::move (caps)});
   }
   count (self, coded.get (), alone);
@@ -340,8 +340,11 @@ next_time (GstAggregator *aggregator)
 GstFlowReturn
 update_caps (GstAggregator *aggregator, GstCaps *, GstCaps **made)
 {
-  *made = gst_pad_get_current_caps (GST_PAD (sink (aggregator, "on")));
-  return *made ? GST_FLOW_OK : GST_AGGREGATOR_FLOW_NEED_DATA;
+  GstCaps *caps = state (aggregator).on.caps.get ();
+  if (!caps)
+    return GST_AGGREGATOR_FLOW_NEED_DATA;
+  *made = gst_caps_ref (caps);
+  return GST_FLOW_OK;
 }
 
 /* The frames of a pad are of the other beam. Returns false. */
@@ -356,27 +359,38 @@ refuse_beam (GstCodedExposurePair *self, bool on)
   return false;
 }
 
+bool
+take_caps (GstCodedExposurePair *self, bool on, GstCaps *caps)
+{
+  PairState &st = state (self);
+  PairStream &stream = on ? st.on : st.off;
+  if (!gst_video_info_from_caps (&stream.info, caps))
+    return false;
+  stream.caps.reset (gst_caps_ref (caps));
+  st.set_due ();
+  if (!on)
+    return true;
+  gst_pad_mark_reconfigure (GST_AGGREGATOR_SRC_PAD (self));
+  if (stream.info.fps_n > 0) {
+    const GstClockTime wait = gst_util_uint64_scale (
+        GST_SECOND, stream.info.fps_d, 4 * guint64 (stream.info.fps_n));
+    gst_aggregator_set_latency (GST_AGGREGATOR (self), wait, wait);
+  }
+  return true;
+}
+
 /* In the order of the frames of a pad. False if they are refused. */
 bool
 follow (GstCodedExposurePair *self, bool on, GstEvent *event)
 {
   PairState &st = state (self);
+  PairStream &stream = on ? st.on : st.off;
   switch (GST_EVENT_TYPE (event)) {
   case GST_EVENT_STREAM_START:
-    (on ? st.on_setup : st.off_setup).reset ();
+    stream.setup.reset ();
     break;
   case GST_EVENT_CAPS:
-    st.set_due ();
-    if (on) {
-      gst_pad_mark_reconfigure (GST_AGGREGATOR_SRC_PAD (self));
-      GstVideoInfo info;
-      if (gst_video_info_from_caps (&info, caps_of (event)) && info.fps_n > 0) {
-        const GstClockTime wait = gst_util_uint64_scale (
-            GST_SECOND, info.fps_d, 4 * guint64 (info.fps_n));
-        gst_aggregator_set_latency (GST_AGGREGATOR (self), wait, wait);
-      }
-    }
-    break;
+    return take_caps (self, on, caps_of (event));
   case GST_EVENT_SEGMENT:
     if (on)
       gst_aggregator_update_segment (GST_AGGREGATOR (self), segment_of (event));
@@ -385,7 +399,7 @@ follow (GstCodedExposurePair *self, bool on, GstEvent *event)
     if (const auto setup = setup_from_tags (tags_of (event)); setup && *setup) {
       if (setup->value ().off_beam == on)
         return refuse_beam (self, on);
-      (on ? st.on_setup : st.off_setup) = setup->value ();
+      stream.setup = setup->value ();
       st.set_due ();
     } else if (on) {
       st.due.emplace_back (gst_event_ref (event));

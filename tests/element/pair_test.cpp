@@ -1,14 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-pair: what becomes a pair, and what is said of the rest. */
 #include <random>
-#include <thread>
 
-#include "common/messages.h"
-#include "common/meta.h"
-#include "common/partner.h"
-#include "common/tag.h"
-#include "harness.h"
-#include "two_beams.h"
+#include "pair_harness.h"
 
 namespace
 {
@@ -16,122 +10,8 @@ namespace
 using namespace codedexposure;
 using namespace codedexposure::gst;
 using namespace codedexposure::test;
+using namespace codedexposure::test::pairs;
 using namespace codedexposure::test::two_beams;
-
-constexpr GstClockTime kMs = GST_MSECOND;
-constexpr GstClockTime kPeriod = 40 * kMs;
-
-/* A frame that is known again by its number. */
-BufferPtr
-numbered (guint64 number, GstClockTime pts, Image<std::uint8_t> picture = {})
-{
-  if (picture.width () == 0)
-    picture = draw<std::uint8_t> (
-        kWidth, kHeight, [&] (int x, int y) { return int (number) + x + y; });
-  BufferPtr frame = frame_of (picture, pts);
-  GST_BUFFER_OFFSET (frame.get ()) = number;
-  GST_BUFFER_DURATION (frame.get ()) = kPeriod;
-  return frame;
-}
-
-/* The frames @numbers, at their times and @late. */
-std::vector<BufferPtr>
-frames (const std::vector<guint64> &numbers, GstClockTime late = 0)
-{
-  std::vector<BufferPtr> all;
-  for (const guint64 number : numbers)
-    all.push_back (numbered (number, number * kPeriod + late));
-  return all;
-}
-
-constexpr guint64 kAlone = G_MAXUINT64;
-using Numbers = std::vector<std::pair<guint64, guint64>>; ///< with partner
-
-class Pair : public ::testing::Test
-{
-protected:
-  Pair ()
-      : pair ("codedexposure-pair", "on", "src"),
-        off (gst_harness_new_with_element (pair.element (), "off", nullptr))
-  {
-    gst_harness_set_live (pair.get (), FALSE);
-    gst_harness_set_live (off.get (), FALSE);
-    pair.set_caps (gray_caps (kWidth, kHeight));
-    gst_harness_set_src_caps_str (
-        off.get (), gray_caps (kWidth, kHeight).c_str ());
-  }
-
-  /* All frames of both cameras, each from a thread of its own, to the end. */
-  Numbers run (std::vector<BufferPtr> on, std::vector<BufferPtr> partners)
-  {
-    const auto push = [] (GstHarness *to, std::vector<BufferPtr> all) {
-      for (BufferPtr &frame : all)
-        gst_harness_push (to, frame.release ());
-      gst_harness_push_event (to, gst_event_new_eos ());
-    };
-    std::jthread second (push, off.get (), std::move (partners));
-    std::jthread first (push, pair.get (), std::move (on));
-    Numbers numbers;
-    GstBuffer *next = nullptr;
-    /* With an error, the end does not come. */
-    while (gst_harness_pull_until_eos (pair.get (), &next) && next) {
-      out.emplace_back (next);
-      const auto partner = get_partner (next);
-      numbers.emplace_back (GST_BUFFER_OFFSET (next),
-          partner ? GST_BUFFER_OFFSET (partner->buffer.get ()) : kAlone);
-    }
-    return numbers;
-  }
-  guint64 counter (const char *name)
-  {
-    return property<guint64> (pair.element (), name);
-  }
-  void expect_counters (
-      guint64 paired, guint64 alone, guint64 refused, guint64 dropped)
-  {
-    EXPECT_EQ (counter ("frames-paired"), paired);
-    EXPECT_EQ (counter ("frames-alone"), alone);
-    EXPECT_EQ (counter ("pairs-refused"), refused);
-    EXPECT_EQ (counter ("partners-dropped"), dropped);
-  }
-  void expect_lost (
-      const char *reason, guint64 count, GstClockTime from, GstClockTime to)
-  {
-    const auto begun = pair.posted<PartnerLost> ();
-    const auto ended = pair.posted<PartnerLost> ();
-    ASSERT_TRUE (begun && ended);
-    EXPECT_TRUE (begun->active);
-    EXPECT_EQ (begun->reason, reason);
-    EXPECT_EQ (begun->from, from);
-    EXPECT_FALSE (ended->active);
-    EXPECT_EQ (ended->reason, reason);
-    EXPECT_EQ (ended->frames, count);
-    EXPECT_EQ (ended->from, from);
-    EXPECT_EQ (ended->to, to);
-  }
-  void push_setup (GstHarness *to, const StreamSetup &setup)
-  {
-    ASSERT_TRUE (gst_harness_push_event (to, setup_to_event (setup)));
-  }
-  /* The stream tag, with a second camera of 40x30 pixels of that setup. */
-  std::optional<StreamSetup> tag_with (StreamSetup second)
-  {
-    second.off_beam = true;
-    push_setup (off.get (), second);
-    push_setup (pair.get (), {.schedule = second.schedule});
-    gst_harness_set_src_caps_str (off.get (), gray_caps (40, 30).c_str ());
-    run (frames ({0}), {});
-    std::optional<StreamSetup> tagged;
-    while (const EventPtr event = pair.pull_event (GST_EVENT_TAG))
-      if (const auto setup = setup_from_tags (tags_of (event.get ())))
-        tagged = setup->value ();
-    return tagged;
-  }
-
-  ElementHarness pair;
-  HarnessPtr off;
-  std::vector<BufferPtr> out;
-};
 
 /* ------------------------------------------------------------------ time -- */
 
@@ -235,99 +115,6 @@ TEST_F (Pair, FramesOfAPatternHavePartners)
   set_frame_meta (on[1].get (), meta);
   EXPECT_EQ (run (std::move (on), frames ({0, 1, 2})),
       (Numbers{{0, 0}, {1, 1}, {2, 2}}));
-}
-
-TEST_F (Pair, GapsOfTheFirstCameraStayBetweenItsFrames)
-{
-  gst_harness_push (off.get (), numbered (0, 0).release ());
-  gst_harness_push (pair.get (), numbered (0, 0).release ());
-  const BufferPtr first (gst_harness_pull (pair.get ()));
-  for (GstHarness *camera : {off.get (), pair.get ()})
-    gst_harness_push_event (camera, gst_event_new_gap (kPeriod, kPeriod));
-  EXPECT_EQ (run (frames ({2}), frames ({2})), (Numbers{{2, 2}}));
-  const EventPtr gap = pair.pull_event (GST_EVENT_GAP);
-  ASSERT_TRUE (gap);
-  GstClockTime pts = 0, duration = 0;
-  gst_event_parse_gap (gap.get (), &pts, &duration);
-  EXPECT_EQ (pts, kPeriod);
-  EXPECT_EQ (duration, kPeriod);
-  EXPECT_FALSE (pair.pull_event (GST_EVENT_GAP));
-}
-
-/* --------------------------------------------------------------- streams -- */
-
-TEST_F (Pair, TheTagSaysHowTheSecondCameraStands)
-{
-  const Schedule schedule = schedule_of (kPreset);
-  const Mapping mapping (Extent{40, 30});
-  BenchProfile bench;
-  bench.camera.size = {40, 30};
-  bench.black_level = Measured{5.2, 0.1};
-  bench.conversion_gain = Measured{20.5, 0.1};
-  bench.read_noise = Measured{6.5, 0.1};
-  bench.light_ratio = Measured{0.75, 0.01};
-  const auto tagged =
-      tag_with ({.schedule = schedule, .mapping = mapping, .bench = bench});
-  EXPECT_EQ (tagged,
-      (StreamSetup{.schedule = schedule,
-          .partner = PartnerSetup{{40, 30}, mapping, 5, 20.5, 6.5, 0.75}}));
-}
-
-/* As behind dmdsync, which tags the profile. */
-TEST_F (Pair, TheMappingOfTheSecondCamerasProfileCounts)
-{
-  BenchProfile bench;
-  bench.camera.size = {40, 30};
-  bench.mapping = Mapping (Extent{40, 30});
-  const auto tagged =
-      tag_with ({.schedule = schedule_of (kPreset), .bench = bench});
-  ASSERT_TRUE (tagged && tagged->partner);
-  EXPECT_EQ (tagged->partner->mapping, bench.mapping);
-}
-
-TEST_F (Pair, OtherTagsOfTheFirstCameraGoThroughAndThoseOfTheSecondDoNot)
-{
-  const auto titled = [] (const char *title) {
-    return gst_event_new_tag (gst_tag_list_new (GST_TAG_TITLE, title, nullptr));
-  };
-  gst_harness_push_event (pair.get (), titled ("first"));
-  gst_harness_push_event (off.get (), titled ("second"));
-  run (frames ({0}), frames ({0}));
-  const EventPtr event = pair.pull_event (GST_EVENT_TAG);
-  ASSERT_TRUE (event);
-  gchar *title = nullptr;
-  gst_tag_list_get_string (tags_of (event.get ()), GST_TAG_TITLE, &title);
-  EXPECT_STREQ (title, "first");
-  g_free (title);
-  EXPECT_FALSE (pair.pull_event (GST_EVENT_TAG));
-}
-
-TEST_F (Pair, SwappedCamerasAreAnErrorThatSaysSo)
-{
-  push_setup (
-      pair.get (), {.schedule = schedule_of (kPreset), .off_beam = true});
-  EXPECT_EQ (run (frames ({0, 1}), frames ({0, 1})), Numbers{});
-  EXPECT_EQ (pair.error (),
-      "The frames of pad on are of the beam of the mirrors that are off. Link "
-      "them to pad off.");
-}
-
-TEST_F (Pair, AFirstCameraAtPadOffIsAnErrorToo)
-{
-  push_setup (off.get (), {.schedule = schedule_of (kPreset)});
-  EXPECT_EQ (run (frames ({0, 1}), frames ({0, 1})), Numbers{});
-  EXPECT_EQ (pair.error (),
-      "The frames of pad off are of the beam of the mirrors that are on. Link "
-      "them to pad on.");
-}
-
-TEST_F (Pair, CapsAndAllocationAreThoseOfTheFirstCamera)
-{
-  gst_harness_set_src_caps_str (
-      off.get (), gray_caps (32, 20, "50/1", "GRAY16_LE").c_str ());
-  run (frames ({0, 1}), {});
-  EXPECT_TRUE (
-      same_caps (pair.pad_caps ().get (), gray_caps (kWidth, kHeight)));
 }
 
 /* ---------------------------------------------------------------- pixels -- */

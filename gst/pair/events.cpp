@@ -1,0 +1,163 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure-pair: events and queries. */
+#include <string>
+#include <vector>
+
+#include "common/caps.h"
+#include "common/tag.h"
+#include "pair/pair.h"
+
+namespace codedexposure::gst::pairs
+{
+
+namespace
+{
+
+/* The frames of a pad are of the other beam. Returns false. */
+bool
+refuse_beam (GstCodedExposurePair *self, bool on)
+{
+  POST_ERROR (self, STREAM, WRONG_TYPE,
+      std::string ("The frames of pad ") + (on ? "on" : "off") +
+          " are of the beam of the mirrors that are " + (on ? "off" : "on") +
+          ". Link them to pad " + (on ? "off" : "on") + ".");
+  state (self).refused = true;
+  return false;
+}
+
+bool
+take_caps (GstCodedExposurePair *self, bool on, GstCaps *caps)
+{
+  PairState &st = state (self);
+  PairStream &stream = on ? st.on : st.off;
+  if (!gst_video_info_from_caps (&stream.info, caps))
+    return false;
+  stream.caps.reset (gst_caps_ref (caps));
+  st.set_due ();
+  if (!on)
+    return true;
+  gst_pad_mark_reconfigure (GST_AGGREGATOR_SRC_PAD (self));
+  if (stream.info.fps_n > 0) {
+    const GstClockTime wait = gst_util_uint64_scale (
+        GST_SECOND, stream.info.fps_d, 4 * guint64 (stream.info.fps_n));
+    gst_aggregator_set_latency (GST_AGGREGATOR (self), wait, wait);
+  }
+  return true;
+}
+
+/* In the order of the frames of a pad. False if they are refused. */
+bool
+follow (GstCodedExposurePair *self, bool on, GstEvent *event)
+{
+  PairState &st = state (self);
+  PairStream &stream = on ? st.on : st.off;
+  switch (GST_EVENT_TYPE (event)) {
+  case GST_EVENT_STREAM_START:
+    stream.setup.reset ();
+    break;
+  case GST_EVENT_CAPS:
+    return take_caps (self, on, caps_of (event));
+  case GST_EVENT_SEGMENT:
+    if (on)
+      gst_aggregator_update_segment (GST_AGGREGATOR (self), segment_of (event));
+    break;
+  case GST_EVENT_TAG:
+    if (const auto setup = setup_from_tags (tags_of (event)); setup && *setup) {
+      if (setup->value ().off_beam == on)
+        return refuse_beam (self, on);
+      stream.setup = setup->value ();
+      st.set_due ();
+    } else if (on) {
+      st.due.emplace_back (gst_event_ref (event));
+    }
+    break;
+  case GST_EVENT_GAP:
+    if (on)
+      st.due.emplace_back (gst_event_ref (event));
+    break;
+  default:
+    break;
+  }
+  return true;
+}
+
+} // namespace
+
+gboolean
+sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstEvent *event)
+{
+  auto *self = as<GstCodedExposurePair> (aggregator);
+  const bool on = pad == sink (self, "on");
+  if (!follow (self, on, event)) {
+    gst_event_unref (event);
+    return FALSE;
+  }
+  switch (GST_EVENT_TYPE (event)) {
+  case GST_EVENT_STREAM_START:
+  case GST_EVENT_SEGMENT:
+  case GST_EVENT_EOS:
+  case GST_EVENT_FLUSH_START:
+  case GST_EVENT_FLUSH_STOP:
+    break;
+  default:
+    /* Only the first camera's reach downstream. The base class would make
+     * frames of gaps. */
+    if (on && GST_EVENT_TYPE (event) != GST_EVENT_CAPS &&
+        GST_EVENT_TYPE (event) != GST_EVENT_TAG &&
+        GST_EVENT_TYPE (event) != GST_EVENT_GAP)
+      break;
+    gst_event_unref (event);
+    return TRUE;
+  }
+  return parent_class<GstAggregatorClass> (aggregator)
+      ->sink_event (aggregator, pad, event);
+}
+
+/* The first camera's caps go through; those of the second are free. */
+gboolean
+sink_query (GstAggregator *aggregator, GstAggregatorPad *pad, GstQuery *query)
+{
+  if (GST_QUERY_TYPE (query) != GST_QUERY_CAPS ||
+      pad != sink (aggregator, "on"))
+    return parent_class<GstAggregatorClass> (aggregator)
+        ->sink_query (aggregator, pad, query);
+  const CapsPtr peer (
+      gst_pad_peer_query_caps (GST_AGGREGATOR_SRC_PAD (aggregator), nullptr));
+  const CapsPtr own (gst_pad_get_pad_template_caps (GST_PAD (pad)));
+  answer_caps (query, intersect_caps (peer.get (), own.get ()));
+  return TRUE;
+}
+
+/* The dmdsync of the first camera drives the mirrors. */
+gboolean
+src_event (GstAggregator *aggregator, GstEvent *event)
+{
+  if (GST_EVENT_TYPE (event) == GST_EVENT_CUSTOM_UPSTREAM)
+    return gst_pad_push_event (GST_PAD (sink (aggregator, "on")), event);
+  return parent_class<GstAggregatorClass> (aggregator)
+      ->src_event (aggregator, event);
+}
+
+gboolean
+src_query (GstAggregator *aggregator, GstQuery *query)
+{
+  if (GST_QUERY_TYPE (query) == GST_QUERY_CUSTOM)
+    return gst_pad_peer_query (GST_PAD (sink (aggregator, "on")), query);
+  return parent_class<GstAggregatorClass> (aggregator)
+      ->src_query (aggregator, query);
+}
+
+GstFlowReturn
+flush (GstAggregator *aggregator)
+{
+  PairState &st = state (aggregator);
+  st.alone.forget ();
+  st.refused_in_a_row = 0;
+  st.check.reset ();
+  std::erase_if (st.due, [] (const EventPtr &event) {
+    return GST_EVENT_TYPE (event.get ()) == GST_EVENT_GAP;
+  });
+  return GST_FLOW_OK;
+}
+
+} // namespace codedexposure::gst::pairs

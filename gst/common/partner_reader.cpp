@@ -6,6 +6,17 @@
 namespace codedexposure::gst
 {
 
+namespace
+{
+
+std::string
+name_of (GstVideoFormat format)
+{
+  return gst_video_format_to_string (format);
+}
+
+} // namespace
+
 Result<PartnerReader>
 PartnerReader::make (const PartnerSetup &partner, const CodedFormat &format,
     const RectifyOptions &options)
@@ -25,7 +36,10 @@ PartnerReader::make (const PartnerSetup &partner, const CodedFormat &format,
   if (!(made->mirrors () == format.size))
     return Error{"their mapping is to another number of mirrors than the coded "
                  "frames have; calibrate both cameras"};
-  reader.size_ = made->camera ();
+  if (!(made->camera () == partner.size))
+    return Error{"their mapping is for frames of " +
+                 size_text (made->camera ()) + " pixels, but they have " +
+                 size_text (partner.size) + "; calibrate the second camera"};
   reader.rectifier_ = std::make_shared<const Rectifier> (*std::move (made));
   return reader;
 }
@@ -39,10 +53,20 @@ PartnerReader::read (
   mapped_.reset ();
   auto partner = get_partner (coded);
   GstVideoInfo info;
-  if (!partner || !gst_video_info_from_caps (&info, partner->caps.get ()) ||
-      GST_VIDEO_INFO_FORMAT (&info) != format_ || info.width != size_.width ||
-      info.height != size_.height)
+  if (!partner || !gst_video_info_from_caps (&info, partner->caps.get ()))
     return std::optional<View> ();
+  const GstVideoFormat format = GST_VIDEO_INFO_FORMAT (&info);
+  const Extent size{info.width, info.height};
+  if (format != format_)
+    return Error{"it is " + name_of (format_) +
+                 ", but the frame of the second "
+                 "camera is " +
+                 name_of (format) +
+                 "; set both cameras to the same pixel format"};
+  if (!(size == size_))
+    return Error{"the frame of the second camera has " + size_text (size) +
+                 " pixels, but the stream tag says " + size_text (size_) +
+                 "; do not scale or crop it"};
   mapped_ = std::make_unique<Mapped> ();
   mapped_->buffer = std::move (partner->buffer);
   mapped_->frame.map (info, mapped_->buffer.get (), GST_MAP_READ);

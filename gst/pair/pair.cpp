@@ -17,7 +17,9 @@
  * of each other: by the start that the metadata of both say, else by running
  * time. Arrival and numbers do not count. A coded frame without a partner
  * passes alone, as it came. So does one that is corrupted, or whose partner is.
- * A frame of the second camera without a coded frame is dropped.
+ * A frame of the second camera without a coded frame is dropped. Both cameras
+ * must have the same pixel format, with the same number of significant bits;
+ * their sizes may differ.
  *
  * Time stamps can be wrong by a frame. The sum of both beams has the light of
  * the whole exposure and shows no masks; that of different exposures shows them
@@ -234,11 +236,81 @@ push_due (GstPad *pad, GstPadProbeInfo *, gpointer data)
   return GST_PAD_PROBE_OK;
 }
 
+std::string
+depth_text (const PairStream &stream)
+{
+  std::string text =
+      gst_video_format_to_string (GST_VIDEO_INFO_FORMAT (&stream.info));
+  if (stream.setup && stream.setup->bits > 0)
+    text += " with " + std::to_string (stream.setup->bits) + " bits";
+  return text;
+}
+
+/* What uses partners reads their pixels as those of coded frames. False if they
+ * differ, which is posted. */
+bool
+check_depth (GstCodedExposurePair *self)
+{
+  PairState &st = state (self);
+  if (!st.on.caps || !st.off.caps)
+    return true;
+  const auto bits_of = [] (const PairStream &stream) {
+    return stream.setup ? stream.setup->bits : 0;
+  };
+  const int bits = bits_of (st.on), other = bits_of (st.off);
+  if (GST_VIDEO_INFO_FORMAT (&st.on.info) ==
+          GST_VIDEO_INFO_FORMAT (&st.off.info) &&
+      (bits == 0 || other == 0 || bits == other))
+    return true;
+  POST_ERROR (self, STREAM, FORMAT,
+      "The frames of the first camera are " + depth_text (st.on) +
+          ", and those of the second are " + depth_text (st.off) +
+          ". Set both cameras to the same pixel format.");
+  st.refused = true;
+  return false;
+}
+
+Found
+take_partner (
+    GstCodedExposurePair *self, GstBuffer *coded, bool late, BufferPtr &partner)
+{
+  PairState &st = state (self);
+  std::vector<BufferPtr> dropped;
+  const auto slack = GstClockTimeDiff (period_of (st.on.info, coded) / 4);
+  const Found found = find_partner (sink (self, "on"), sink (self, "off"),
+      coded, slack, late, partner, dropped);
+  locked (self, [&] { return st.counters.dropped += dropped.size (); });
+  for (const BufferPtr &frame : dropped)
+    if (frame)
+      take_alone (self, frame.get (), true);
+  return found;
+}
+
+GstFlowReturn
+push (GstCodedExposurePair *self, BufferPtr coded, BufferPtr partner)
+{
+  const Alone alone = judge (self, coded.get (), partner.get ());
+  if (!reason_of (alone)) {
+    if (!shows_pattern (coded.get ()))
+      watch_drift (self, coded.get (), partner.get ());
+    coded.reset (gst_buffer_make_writable (coded.release ()));
+    GstCaps *caps = state (self).off.caps.get ();
+    set_partner (coded.get (),
+        {std::move (partner), CapsPtr (caps ? gst_caps_ref (caps) : nullptr)});
+  }
+  count (self, coded.get (), alone);
+  auto *aggregator = GST_AGGREGATOR (self);
+  auto *src = GST_AGGREGATOR_PAD (GST_AGGREGATOR_SRC_PAD (aggregator));
+  locked (src,
+      [&] { return src->segment.position = GST_BUFFER_PTS (coded.get ()); });
+  return gst_aggregator_finish_buffer (aggregator, coded.release ());
+}
+
 GstFlowReturn
 aggregate (GstAggregator *aggregator, gboolean late)
 {
   auto *self = as<GstCodedExposurePair> (aggregator);
-  GstAggregatorPad *on = sink (self, "on"), *off = sink (self, "off");
+  GstAggregatorPad *on = sink (self, "on");
   if (state (self).refused)
     return GST_FLOW_ERROR;
   const BufferPtr head (gst_aggregator_pad_peek_buffer (on));
@@ -249,34 +321,13 @@ aggregate (GstAggregator *aggregator, gboolean late)
     return GST_FLOW_EOS;
   }
   BufferPtr partner;
-  std::vector<BufferPtr> dropped;
-  const auto slack =
-      GstClockTimeDiff (period_of (state (self).on.info, head.get ()) / 4);
-  const Found found =
-      find_partner (on, off, head.get (), slack, late, partner, dropped);
-  locked (
-      self, [&] { return state (self).counters.dropped += dropped.size (); });
-  for (const BufferPtr &frame : dropped)
-    if (frame)
-      take_alone (self, frame.get (), true);
-  if (found == Found::kWait)
+  if (take_partner (self, head.get (), late, partner) == Found::kWait)
     return GST_AGGREGATOR_FLOW_NEED_DATA;
+  if (partner && !check_depth (self))
+    return GST_FLOW_ERROR;
   BufferPtr coded (gst_aggregator_pad_pop_buffer (on));
-  if (!coded)
-    return GST_AGGREGATOR_FLOW_NEED_DATA;
-  const Alone alone = judge (self, coded.get (), partner.get ());
-  if (!reason_of (alone)) {
-    if (!shows_pattern (coded.get ()))
-      watch_drift (self, coded.get (), partner.get ());
-    coded.reset (gst_buffer_make_writable (coded.release ()));
-    CapsPtr caps (gst_caps_ref (state (self).off.caps.get ()));
-    set_partner (coded.get (), {std::move (partner), std::move (caps)});
-  }
-  count (self, coded.get (), alone);
-  auto *src = GST_AGGREGATOR_PAD (GST_AGGREGATOR_SRC_PAD (aggregator));
-  locked (src,
-      [&] { return src->segment.position = GST_BUFFER_PTS (coded.get ()); });
-  return gst_aggregator_finish_buffer (aggregator, coded.release ());
+  return coded ? push (self, std::move (coded), std::move (partner))
+               : GST_AGGREGATOR_FLOW_NEED_DATA;
 }
 
 /* A coded frame that waits; without one, there is nothing to be late for. */

@@ -32,7 +32,7 @@ struct Run {
   std::vector<EventPtr> due; ///< before the next coded frame
   bool setup_due = false;
   bool check_due = false; ///< a stream is another
-  bool refused = false;   ///< a stream is of the wrong beam
+  bool refused = false;   ///< an error was posted
   PairCheck check;
   AloneFrames alone;
   guint64 refused_in_a_row = 0;

@@ -151,8 +151,42 @@ TEST_F (PairSizes, TheCapsOfACodedFrameAreItsOwnIfItsCameraIsAhead)
   EXPECT_EQ (run (std::move (on), frames ({0, 1})), (Numbers{{0, 0}, {1, 1}}));
 }
 
-/* -------------------------------------------------------------- gaps, end --
- */
+/* Fusion and sums read the pixels of both by one format. */
+TEST_F (Pair, CamerasOfDifferentFormatsAreAnErrorThatNamesBoth)
+{
+  gst_harness_set_src_caps_str (off.get (),
+      gray_caps (kWidth / 2, kHeight, "25/1", "GRAY16_LE").c_str ());
+  EXPECT_EQ (run (frames ({0, 1}), frames ({0, 1})), Numbers{});
+  EXPECT_EQ (pair.error (),
+      "The frames of the first camera are GRAY8, and those of the second are "
+      "GRAY16_LE. Set both cameras to the same pixel format.");
+}
+
+TEST_F (Pair, CamerasOfDifferentBitsAreAnErrorThatNamesBoth)
+{
+  for (GstHarness *camera : {pair.get (), off.get ()}) {
+    gst_harness_set_src_caps_str (
+        camera, gray_caps (kWidth / 2, kHeight, "25/1", "GRAY16_LE").c_str ());
+    const bool is_first = camera == pair.get ();
+    push_setup (camera, {.schedule = schedule_of (kPreset),
+                            .bits = is_first ? 10 : 12,
+                            .off_beam = !is_first});
+  }
+  EXPECT_EQ (run (frames ({0, 1}), frames ({0, 1})), Numbers{});
+  EXPECT_EQ (pair.error (),
+      "The frames of the first camera are GRAY16_LE with 10 bits, and those of "
+      "the second are GRAY16_LE with 12 bits. Set both cameras to the same "
+      "pixel format.");
+}
+
+TEST_F (Pair, TheSizesOfBothCamerasMayDiffer)
+{
+  gst_harness_set_src_caps_str (
+      off.get (), gray_caps (kWidth / 2, 2 * kHeight).c_str ());
+  EXPECT_EQ (run (frames ({0, 1}), frames ({0, 1})), (Numbers{{0, 0}, {1, 1}}));
+}
+
+/* ------------------------------------------------------------ gaps, end -- */
 
 TEST_F (Pair, GapsOfTheFirstCameraStayBetweenItsFrames)
 {

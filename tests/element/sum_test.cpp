@@ -158,6 +158,43 @@ TEST_F (Sum, OfAnotherSizeNeedsAMapping)
       sum.error ().find ("calibrate the second camera"), std::string::npos);
 }
 
+TEST_F (Sum, APartnerOfAnotherFormatIsAnErrorThatNamesBoth)
+{
+  tell ();
+  BufferPtr frame = pair (0, true);
+  const BufferPtr wide (
+      gst_buffer_new_allocate (nullptr, 2 * gsize (kWidth) * kHeight, nullptr));
+  set_partner (frame.get (),
+      {BufferPtr (gst_buffer_ref (wide.get ())),
+          caps_of (gray_caps (kWidth, kHeight, "25/1", "GRAY16_LE"))});
+  EXPECT_EQ (sum.push (std::move (frame)), GST_FLOW_ERROR);
+  EXPECT_EQ (sum.error (),
+      "A coded frame could not be decoded: it is GRAY8, but the frame of the "
+      "second camera is GRAY16_LE; set both cameras to the same pixel format.");
+}
+
+TEST_F (Sum, APartnerOfAnotherSizeThanTheTagSaysIsAnError)
+{
+  tell ();
+  BufferPtr frame = pair (0, true);
+  set_partner (frame.get (), {frame_of (Image<std::uint8_t> (kWidth, 40), 0),
+                                 caps_of (gray_caps (kWidth, 40))});
+  EXPECT_EQ (sum.push (std::move (frame)), GST_FLOW_ERROR);
+  EXPECT_NE (sum.error ().find ("64x40 pixels, but the stream tag says 64x48"),
+      std::string::npos);
+}
+
+TEST_F (Sum, AMappingForFramesOfAnotherSizeIsAnError)
+{
+  setup.partner->size = {kWidth / 2, kHeight};
+  setup.partner->mapping = Mapping (Extent{kWidth, kHeight});
+  tell ();
+  EXPECT_NE (sum.push (pair (0)), GST_FLOW_OK);
+  EXPECT_NE (sum.error ().find ("their mapping is for frames of 64x48 pixels, "
+                                "but they have 32x48"),
+      std::string::npos);
+}
+
 /* Of both depths, and beside subframes of the first camera. */
 TEST (SumBench, RunsBesideSubframes)
 {

@@ -16,18 +16,26 @@ segment_at (GstAggregatorPad *pad)
 Instant
 instant_of (GstAggregatorPad *pad, GstBuffer *frame)
 {
+  const auto known = [] (GstClockTime time) {
+    return GST_CLOCK_TIME_IS_VALID (time)
+               ? std::optional (GstClockTimeDiff (time))
+               : std::nullopt;
+  };
+  const GstSegment segment = segment_at (pad);
   const auto meta = get_frame_meta (frame);
-  return {meta ? meta->exposure_start : GST_CLOCK_TIME_NONE,
-      running_time (segment_at (pad), GST_BUFFER_PTS (frame))};
+  Instant instant{known (meta ? meta->exposure_start : GST_CLOCK_TIME_NONE),
+      known (running_time (segment, GST_BUFFER_PTS (frame)))};
+  if (instant.said && segment.rate < 0.0)
+    instant.said = -*instant.said;
+  return instant;
 }
 
 std::optional<GstClockTimeDiff>
 later_by (const Instant &one, const Instant &other)
 {
   for (const auto member : {&Instant::said, &Instant::running})
-    if (GST_CLOCK_TIME_IS_VALID (one.*member) &&
-        GST_CLOCK_TIME_IS_VALID (other.*member))
-      return GST_CLOCK_DIFF (other.*member, one.*member);
+    if (one.*member && other.*member)
+      return *(one.*member) - *(other.*member);
   return std::nullopt;
 }
 

@@ -13,15 +13,16 @@
 namespace codedexposure::gst
 {
 
-/** As the frame's meta says, on the clock of both cameras, and by its PTS, as
- * running time. */
+/** As the frame's meta says, on the clock of both cameras, or before its zero
+ * if time runs backwards, and by its PTS, as running time. */
 struct Instant {
-  GstClockTime said, running;
+  std::optional<GstClockTimeDiff> said, running;
 };
 Instant instant_of (GstAggregatorPad *pad, GstBuffer *frame);
 
-/** By how much @p one is later; none: it is not known. Recordings of both
- * cameras may begin with different frames, so what was said comes first. */
+/** By how much @p one is played later; none: it is not known. Recordings of
+ * both cameras may begin with different frames, so what was said comes first.
+ */
 std::optional<GstClockTimeDiff> later_by (
     const Instant &one, const Instant &other);
 

@@ -31,15 +31,22 @@ TEST_F (Pair, IsNotWhatIsFartherAway)
   expect_lost ("missing", 3, 0, 2 * kPeriod);
 }
 
+/* The exposure of a frame begins at its number of periods. */
+void
+say_starts (const std::vector<BufferPtr> &camera)
+{
+  for (const BufferPtr &frame : camera) {
+    FrameMeta meta;
+    meta.exposure_start = GST_BUFFER_OFFSET (frame.get ()) * kPeriod;
+    set_frame_meta (frame.get (), meta);
+  }
+}
+
 TEST_F (Pair, TheStartThatTheMetasSayCountsAndNotThePts)
 {
   auto on = frames ({0, 1, 2}), partners = frames ({0, 1, 2}, 30 * kMs);
   for (auto *camera : {&on, &partners})
-    for (const BufferPtr &frame : *camera) {
-      FrameMeta meta;
-      meta.exposure_start = GST_BUFFER_OFFSET (frame.get ()) * kPeriod;
-      set_frame_meta (frame.get (), meta);
-    }
+    say_starts (*camera);
   EXPECT_EQ (run (std::move (on), std::move (partners)),
       (Numbers{{0, 0}, {1, 1}, {2, 2}}));
 }
@@ -53,6 +60,22 @@ TEST_F (Pair, RunningTimesAreCompared)
   gst_harness_push_event (off.get (), gst_event_new_segment (&segment));
   EXPECT_EQ (run (frames ({0, 1, 2}), frames ({0, 1, 2}, 1000 * kMs)),
       (Numbers{{0, 0}, {1, 1}, {2, 2}}));
+}
+
+TEST_F (Pair, FramesAfterALostOneHavePartnersBackwardsAsWell)
+{
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  segment.rate = -1.0;
+  segment.stop = 5 * kPeriod;
+  for (GstHarness *camera : {pair.get (), off.get ()})
+    gst_harness_push_event (camera, gst_event_new_segment (&segment));
+  auto on = frames ({4, 3, 1, 0}), partners = frames ({4, 3, 2, 1, 0});
+  for (auto *camera : {&on, &partners})
+    say_starts (*camera);
+  EXPECT_EQ (run (std::move (on), std::move (partners)),
+      (Numbers{{4, 4}, {3, 3}, {1, 1}, {0, 0}}));
+  expect_counters (4, 0, 0, 1);
 }
 
 /* ---------------------------------------------------------------- losses -- */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-pair: events and queries. */
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/caps.h"
@@ -36,6 +37,7 @@ take_caps (GstCodedExposurePair *self, bool on, GstCaps *caps)
   st.set_due ();
   if (!on)
     return true;
+  st.has_begun = false;
   gst_pad_mark_reconfigure (GST_AGGREGATOR_SRC_PAD (self));
   if (stream.info.fps_n > 0) {
     const GstClockTime wait = gst_util_uint64_scale (
@@ -58,8 +60,10 @@ follow (GstCodedExposurePair *self, bool on, GstEvent *event)
   case GST_EVENT_CAPS:
     return take_caps (self, on, caps_of (event));
   case GST_EVENT_SEGMENT:
-    if (on)
-      gst_aggregator_update_segment (GST_AGGREGATOR (self), segment_of (event));
+    if (!on)
+      break;
+    st.has_begun = false;
+    gst_aggregator_update_segment (GST_AGGREGATOR (self), segment_of (event));
     break;
   case GST_EVENT_TAG:
     if (const auto setup = setup_from_tags (tags_of (event)); setup && *setup) {
@@ -74,6 +78,8 @@ follow (GstCodedExposurePair *self, bool on, GstEvent *event)
   case GST_EVENT_GAP:
     if (on)
       st.due.emplace_back (gst_event_ref (event));
+    if (on && st.has_begun)
+      push_due (self);
     break;
   default:
     break;
@@ -82,6 +88,23 @@ follow (GstCodedExposurePair *self, bool on, GstEvent *event)
 }
 
 } // namespace
+
+void
+push_due (GstCodedExposurePair *self)
+{
+  PairState &st = state (self);
+  GstPad *pad = GST_AGGREGATOR_SRC_PAD (self);
+  /* A gap is in place of a frame, which needs the tag first. */
+  if (std::exchange (st.setup_due, false) && st.on.setup) {
+    StreamSetup setup = *st.on.setup;
+    if (st.off.caps)
+      setup.partner = st.off.setup.value_or (StreamSetup ())
+                          .as_partner ({st.off.info.width, st.off.info.height});
+    gst_pad_push_event (pad, setup_to_event (setup));
+  }
+  for (EventPtr &event : std::exchange (st.due, {}))
+    gst_pad_push_event (pad, event.release ());
+}
 
 gboolean
 sink_event (GstAggregator *aggregator, GstAggregatorPad *pad, GstEvent *event)
@@ -154,6 +177,7 @@ flush (GstAggregator *aggregator)
   st.alone.forget ();
   st.refused_in_a_row = 0;
   st.check.reset ();
+  st.has_begun = false;
   std::erase_if (st.due, [] (const EventPtr &event) {
     return GST_EVENT_TYPE (event.get ()) == GST_EVENT_GAP;
   });

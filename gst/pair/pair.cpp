@@ -217,23 +217,30 @@ count (GstCodedExposurePair *self, GstBuffer *coded, Alone alone)
   warn_if_out_of_step (self, alone);
 }
 
-/* Before the frame that is next at the source pad, where caps and segment of
- * the base class have passed. */
+/* Here caps and segment of the base class have passed. */
 GstPadProbeReturn
-push_due (GstPad *pad, GstPadProbeInfo *, gpointer data)
+before_frame (GstPad *, GstPadProbeInfo *, gpointer data)
 {
   auto *self = static_cast<GstCodedExposurePair *> (data);
   PairState &st = state (self);
-  for (EventPtr &event : std::exchange (st.due, {}))
-    gst_pad_push_event (pad, event.release ());
-  if (std::exchange (st.setup_due, false) && st.on.setup) {
-    StreamSetup setup = *st.on.setup;
-    if (st.off.caps)
-      setup.partner = st.off.setup.value_or (StreamSetup ())
-                          .as_partner ({st.off.info.width, st.off.info.height});
-    gst_pad_push_event (pad, setup_to_event (setup));
+  push_due (self);
+  st.has_begun = true;
+  return st.has_ended ? GST_PAD_PROBE_DROP : GST_PAD_PROBE_OK;
+}
+
+/* The base class pushes caps and segment with frames only, and what is due
+ * comes after them: an empty frame, which the probe drops, has them pushed. */
+GstFlowReturn
+end (GstCodedExposurePair *self)
+{
+  PairState &st = state (self);
+  st.alone.end (self);
+  if (st.is_due ()) {
+    st.has_ended = true;
+    gst_aggregator_finish_buffer (GST_AGGREGATOR (self), gst_buffer_new ());
+    st.has_ended = false;
   }
-  return GST_PAD_PROBE_OK;
+  return GST_FLOW_EOS;
 }
 
 std::string
@@ -316,10 +323,8 @@ aggregate (GstAggregator *aggregator, gboolean late)
   const BufferPtr head (gst_aggregator_pad_peek_buffer (on));
   if (!head && !gst_aggregator_pad_is_eos (on))
     return GST_AGGREGATOR_FLOW_NEED_DATA;
-  if (!head) {
-    state (self).alone.end (self);
-    return GST_FLOW_EOS;
-  }
+  if (!head)
+    return end (self);
   BufferPtr partner;
   if (take_partner (self, head.get (), late, partner) == Found::kWait)
     return GST_AGGREGATOR_FLOW_NEED_DATA;
@@ -441,7 +446,7 @@ set_up_instance (GstCodedExposurePair *self)
             "direction", GST_PAD_SINK, "template", pad_template, nullptr)));
   }
   gst_pad_add_probe (GST_AGGREGATOR_SRC_PAD (self), GST_PAD_PROBE_TYPE_BUFFER,
-      push_due, self, nullptr);
+      before_frame, self, nullptr);
 }
 
 } // namespace

@@ -29,8 +29,12 @@ inline constexpr PartnerDrift::Shift kUnknown{
  * also handles serialized events. */
 struct Run {
   PairStream on, off;
-  std::vector<EventPtr> due; ///< before the next coded frame
+  std::vector<EventPtr> due; ///< before the next coded frame or the end
   bool setup_due = false;
+  /** A frame has pushed caps and segment of the base class, so that a gap need
+   * not wait for one. */
+  bool has_begun = false;
+  bool has_ended = false; ///< the next frame is none
   bool check_due = false; ///< a stream is another
   bool refused = false;   ///< an error was posted
   PairCheck check;
@@ -39,6 +43,7 @@ struct Run {
   DriftWatch drift;
 
   void set_due () { setup_due = check_due = true; }
+  bool is_due () const { return setup_due || !due.empty (); }
 };
 
 struct PairState : Run {
@@ -62,6 +67,9 @@ sink (gpointer self, const char *name)
   /* Always there, and so is what it points to. */
   return GST_AGGREGATOR_PAD (pad_of (GST_ELEMENT (self), name).get ());
 }
+
+/* The events that wait, and the stream tag if it has changed. */
+void push_due (GstCodedExposurePair *self);
 
 /* Virtual functions of GstAggregator. */
 gboolean sink_event (

@@ -205,4 +205,33 @@ TEST_F (Pair, GapsOfTheFirstCameraStayBetweenItsFrames)
   EXPECT_FALSE (pair.pull_event (GST_EVENT_GAP));
 }
 
+/* Sinks wait for it where the frames of a stream pause. */
+TEST_F (Pair, AGapOfTheFirstCameraDoesNotWaitForItsNextFrame)
+{
+  for (GstHarness *camera : {off.get (), pair.get ()})
+    gst_harness_push (camera, numbered (0, 0).release ());
+  const BufferPtr first (gst_harness_pull (pair.get ()));
+  pair.push_event (gst_event_new_gap (kPeriod, kPeriod));
+  bool has_come = false;
+  while (const EventPtr event{gst_harness_pull_event (pair.get ())}) {
+    has_come = GST_EVENT_TYPE (event.get ()) == GST_EVENT_GAP;
+    if (has_come)
+      break;
+  }
+  EXPECT_TRUE (has_come);
+}
+
+TEST_F (Pair, WhatComesBeforeAnEndWithoutFramesComesOutInItsOrder)
+{
+  push_setup (pair.get (), {.schedule = schedule_of (kPreset)});
+  pair.push_event (gst_event_new_gap (kPeriod, kPeriod));
+  EXPECT_EQ (run ({}, {}), Numbers{});
+  std::vector<GstEventType> types;
+  while (const EventPtr event{gst_harness_try_pull_event (pair.get ())})
+    if (GST_EVENT_TYPE (event.get ()) != GST_EVENT_EOS)
+      types.push_back (GST_EVENT_TYPE (event.get ()));
+  EXPECT_EQ (types, (std::vector{GST_EVENT_STREAM_START, GST_EVENT_CAPS,
+                        GST_EVENT_SEGMENT, GST_EVENT_TAG, GST_EVENT_GAP}));
+}
+
 } // namespace

@@ -58,6 +58,7 @@
 #include "common/tag.h"
 #include "container.h"
 #include "ffv1_encoder.h"
+#include "muxer_input.h"
 #include "parts.h"
 
 using namespace codedexposure;
@@ -76,15 +77,10 @@ struct Settings {
 };
 
 /** What makes the two tracks of a camera. */
-struct Branch {
+struct Branch : MuxerInput {
   GstElement *log = nullptr; ///< null: there is no such camera
   GstElement *frames = nullptr, *lines = nullptr;
   GstElement *encoder = nullptr; ///< null: frames are raw, or it is missing
-  GstPad *video = nullptr, *text = nullptr; ///< of the muxer, which owns them
-
-  /** DTS of the last frame, of its streaming thread, and of the last line. */
-  GstClockTime frame_order = GST_CLOCK_TIME_NONE;
-  GstClockTime line_order = GST_CLOCK_TIME_NONE;
 };
 
 struct RecordMuxState {
@@ -115,109 +111,6 @@ G_DEFINE_ENUM_TYPE (GstCodedExposureRecordCodec,
     {int (Codec::copy), "As they come, encoded", "copy"});
 
 /* ---------------------------------------------------------- inner muxer -- */
-
-bool
-has_format (const GstCaps *caps, const char *format)
-{
-  const GstStructure *structure = gst_caps_get_structure (caps, 0);
-  const gchar *own = gst_structure_get_string (structure, "format");
-  return gst_structure_has_name (structure, "video/x-raw") &&
-         g_strcmp0 (own, format) == 0;
-}
-
-/* It would refuse 16-bit grey. */
-GstPadProbeReturn
-answer (GstQuery *query)
-{
-  GstCaps *caps = nullptr;
-  if (GST_QUERY_TYPE (query) == GST_QUERY_ACCEPT_CAPS) {
-    gst_query_parse_accept_caps (query, &caps);
-    if (!has_format (caps, "GRAY16_LE") && !has_format (caps, kDeepFormat))
-      return GST_PAD_PROBE_OK;
-    gst_query_set_accept_caps_result (query, TRUE);
-    return GST_PAD_PROBE_HANDLED;
-  }
-  if (GST_QUERY_TYPE (query) != GST_QUERY_CAPS)
-    return GST_PAD_PROBE_OK;
-  answer_caps (query, CapsPtr (gst_caps_from_string (kPartCaps)));
-  return GST_PAD_PROBE_HANDLED;
-}
-
-GstEvent *
-rename_format (GstEvent *event)
-{
-  GstCaps *caps = caps_of (event);
-  if (!has_format (caps, "GRAY16_LE"))
-    return event;
-  const CapsPtr renamed (gst_caps_copy (caps));
-  gst_caps_set_simple (
-      renamed.get (), "format", G_TYPE_STRING, kDeepFormat, nullptr);
-  gst_event_unref (event);
-  return gst_event_new_caps (renamed.get ());
-}
-
-/* Frames of another recording were taken when that was made. */
-void
-keep_date (GstElement *mux, const GstTagList *tags)
-{
-  GstDateTime *date = nullptr;
-  if (!gst_tag_list_get_date_time (tags, GST_TAG_DATE_TIME, &date))
-    return;
-  if (GDateTime *taken = gst_date_time_to_g_date_time (date)) {
-    g_object_set (mux, "creation-time", taken, nullptr);
-    g_date_time_unref (taken);
-  }
-  gst_date_time_unref (date);
-}
-
-GstPadProbeReturn
-on_video (GstPad *pad, GstPadProbeInfo *info, gpointer) noexcept
-{
-  const auto type = GST_PAD_PROBE_INFO_TYPE (info);
-  if (type & GST_PAD_PROBE_TYPE_QUERY_DOWNSTREAM)
-    return type & GST_PAD_PROBE_TYPE_PUSH
-               ? answer (GST_PAD_PROBE_INFO_QUERY (info))
-               : GST_PAD_PROBE_OK;
-  auto *event = GST_PAD_PROBE_INFO_EVENT (info);
-  if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS)
-    info->data = rename_format (event);
-  if (GST_EVENT_TYPE (event) == GST_EVENT_TAG)
-    keep_date (GST_PAD_PARENT (pad), tags_of (event));
-  return GST_PAD_PROBE_OK;
-}
-
-/* With live sources, matroskamux >= 1.24 does not wait for frames: it writes
- * the lines of frames that come late, because their encoder is slow, seconds
- * before them, and the frames get wrong times. */
-GstPadProbeReturn
-on_latency (GstPad *, GstPadProbeInfo *info, gpointer) noexcept
-{
-  GstQuery *query = GST_PAD_PROBE_INFO_QUERY (info);
-  if (GST_QUERY_TYPE (query) != GST_QUERY_LATENCY)
-    return GST_PAD_PROBE_OK;
-  gst_query_set_latency (query, FALSE, 0, GST_CLOCK_TIME_NONE);
-  return GST_PAD_PROBE_HANDLED;
-}
-
-/* The muxer takes frames and lines in the order of their DTS, which is that in
- * which they come, so that a frame that is late is written with its line.
- * @last: a GstClockTime. */
-GstPadProbeReturn
-on_buffer (GstPad *, GstPadProbeInfo *info, gpointer last) noexcept
-{
-  auto &order = *static_cast<GstClockTime *> (last);
-  GstBuffer *buffer =
-      gst_buffer_make_writable (GST_PAD_PROBE_INFO_BUFFER (info));
-  info->data = buffer;
-  if (!GST_BUFFER_PTS_IS_VALID (buffer))
-    return GST_PAD_PROBE_OK;
-  if (GST_CLOCK_TIME_IS_VALID (order))
-    order = std::max (order + 1, GST_BUFFER_PTS (buffer));
-  else
-    order = GST_BUFFER_PTS (buffer);
-  GST_BUFFER_DTS (buffer) = order;
-  return GST_PAD_PROBE_OK;
-}
 
 GstPadProbeReturn
 on_output (GstPad *, GstPadProbeInfo *info, gpointer self) noexcept
@@ -259,30 +152,6 @@ set_up_queues (const Branch &branch)
       "max-size-time", kNoLimit, nullptr);
 }
 
-/* The muxer must be there. */
-void
-add_tracks (GstElement *mux, Branch &branch)
-{
-  const ObjectPtr<GstPad> video (
-      gst_element_request_pad_simple (mux, "video_%u"));
-  const ObjectPtr<GstPad> text (
-      gst_element_request_pad_simple (mux, "subtitle_%u"));
-  branch.video = video.get ();
-  branch.text = text.get ();
-  gst_pad_add_probe (branch.video,
-      GstPadProbeType (GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM |
-                       GST_PAD_PROBE_TYPE_QUERY_DOWNSTREAM),
-      on_video, nullptr, nullptr);
-  for (const auto &[pad, order] : {std::pair{branch.video, &branch.frame_order},
-           std::pair{branch.text, &branch.line_order}}) {
-    gst_pad_add_probe (
-        pad, GST_PAD_PROBE_TYPE_QUERY_UPSTREAM, on_latency, nullptr, nullptr);
-    gst_pad_add_probe (
-        pad, GST_PAD_PROBE_TYPE_BUFFER, on_buffer, order, nullptr);
-  }
-  gst_pad_link (pad_of (branch.lines, "src").get (), branch.text);
-}
-
 void
 add_branch (GstElement *self, Branch &branch)
 {
@@ -295,8 +164,10 @@ add_branch (GstElement *self, Branch &branch)
       GST_BIN (self), branch.log, branch.frames, branch.lines, nullptr);
   gst_element_link_pads (branch.log, "src", branch.frames, "sink");
   gst_element_link_pads (branch.log, "track", branch.lines, "sink");
-  if (state.mux)
-    add_tracks (state.mux, branch);
+  if (!state.mux)
+    return;
+  branch.request_from (state.mux);
+  gst_pad_link (pad_of (branch.lines, "src").get (), branch.text);
 }
 
 bool
@@ -317,7 +188,7 @@ add_encoder (GstElement *self, Branch &branch, guint threads)
 bool
 begin_branch (GstElement *self, Branch &branch, const Settings &settings)
 {
-  branch.frame_order = branch.line_order = GST_CLOCK_TIME_NONE;
+  branch.restart ();
   return settings.codec == Codec::ffv1
              ? add_encoder (self, branch, settings.threads)
              : gst_pad_link (pad_of (branch.frames, "src").get (),
@@ -375,7 +246,7 @@ begin_anew (GstElement *self)
   auto &state = state_in<Self> (self);
   std::vector<std::pair<GstPad *, ObjectPtr<GstPad>>> links;
   for (Branch *branch : {&state.coded, &state.partner}) {
-    branch->frame_order = branch->line_order = GST_CLOCK_TIME_NONE;
+    branch->restart ();
     for (GstPad *pad : {branch->video, branch->text})
       if (pad)
         links.emplace_back (pad, gst_pad_get_peer (pad));

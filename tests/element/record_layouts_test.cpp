@@ -1,0 +1,102 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* codedexposure-recordmux: frames whose bytes are not laid out as GStreamer
+ * does are recorded as their pixels. */
+#include <filesystem>
+
+#include "pipeline.h"
+
+namespace
+{
+
+using namespace codedexposure;
+using namespace codedexposure::gst;
+using namespace codedexposure::test;
+
+constexpr int kFrames = 3;
+
+struct Layout {
+  const char *name, *format;
+  int width, height;
+  gsize before;  ///< bytes before the first row
+  gsize between; ///< after each row, beyond those of GStreamer
+  gsize after;   ///< the last one
+  const char *options;
+};
+
+/* The same pixels, among bytes that are none. */
+BufferPtr
+laid_out (const GstVideoInfo &info, GstBuffer *frame, const Layout &layout)
+{
+  const gsize own = gsize (GST_VIDEO_INFO_PLANE_STRIDE (&info, 0));
+  const gsize rows = gsize (info.height), stride = own + layout.between;
+  const gsize size = layout.before + stride * rows + layout.after;
+  BufferPtr to (gst_buffer_new_allocate (nullptr, size, nullptr));
+  gst_buffer_memset (to.get (), 0, 0xee, size);
+  GstMapInfo map;
+  gst_buffer_map (frame, &map, GST_MAP_READ);
+  for (gsize y = 0; y < rows; y++)
+    gst_buffer_fill (
+        to.get (), layout.before + y * stride, map.data + y * own, own);
+  gst_buffer_unmap (frame, &map);
+  gsize offsets[GST_VIDEO_MAX_PLANES] = {layout.before};
+  gint strides[GST_VIDEO_MAX_PLANES] = {gint (stride)};
+  if (layout.before + layout.between > 0)
+    gst_buffer_add_video_meta_full (to.get (), GST_VIDEO_FRAME_FLAG_NONE,
+        GST_VIDEO_INFO_FORMAT (&info), guint (info.width), guint (info.height),
+        1, offsets, strides);
+  gst_buffer_copy_into (to.get (), frame, GST_BUFFER_COPY_TIMESTAMPS, 0, -1);
+  return to;
+}
+
+GstPadProbeReturn
+lay_out (GstPad *pad, GstPadProbeInfo *info, gpointer layout)
+{
+  const BufferPtr frame (GST_PAD_PROBE_INFO_BUFFER (info));
+  const CapsPtr caps (gst_pad_get_current_caps (pad));
+  GstVideoInfo video;
+  gst_video_info_from_caps (&video, caps.get ());
+  info->data =
+      laid_out (video, frame.get (), *static_cast<const Layout *> (layout))
+          .release ();
+  return GST_PAD_PROBE_OK;
+}
+
+class RecordLayouts : public ::testing::TestWithParam<Layout>
+{
+};
+
+TEST_P (RecordLayouts, AreReadAsTheyWereSeen)
+{
+  Layout layout = GetParam ();
+  const std::string path =
+      "/tmp/record_layouts_test_" + std::to_string (getpid ()) + ".mkv";
+  {
+    Pipeline recording (
+        "videotestsrc num-buffers=" + std::to_string (kFrames) + " ! " +
+        gray_caps (layout.width, layout.height, "100/1", layout.format) +
+        " ! identity name=change ! codedexposure-recordmux " + layout.options +
+        " ! filesink location=" + path);
+    gst_pad_add_probe (recording.pad ("change", "src").get (),
+        GST_PAD_PROBE_TYPE_BUFFER, lay_out, &layout, nullptr);
+    ASSERT_EQ (recording.play (), "");
+  }
+  Pipeline reading ("filesrc location=" + path +
+                    " ! codedexposure-recorddemux name=demux ! fakesink");
+  EXPECT_EQ (reading.play (), "");
+  const ObjectPtr<GstElement> demux = reading["demux"];
+  EXPECT_EQ (counter_of (demux.get (), "frames"), guint64 (kFrames));
+  EXPECT_EQ (counter_of (demux.get (), "frames-damaged"), 0u);
+  EXPECT_EQ (counter_of (demux.get (), "frames-missing"), 0u);
+  std::filesystem::remove (path);
+}
+
+INSTANTIATE_TEST_SUITE_P (All, RecordLayouts,
+    ::testing::Values (
+        Layout{"Strides", "GRAY8", 64, 48, 32, 64, 0, "codec=raw"},
+        Layout{"DeepStrides", "GRAY16_LE", 64, 48, 32, 128, 0, "codec=raw"},
+        Layout{"Longer", "GRAY8", 64, 48, 0, 0, 100, "codec=raw"},
+        Layout{"DeepLonger", "GRAY16_LE", 64, 48, 0, 0, 100, "codec=raw"},
+        Layout{"OneRow", "GRAY8", 64, 1, 32, 0, 100, "codec=ffv1"}),
+    [] (const auto &layout) { return layout.param.name; });
+
+} // namespace

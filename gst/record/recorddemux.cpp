@@ -64,6 +64,7 @@
 #include "common/element.h"
 #include "common/elements.h"
 #include "common/raii.h"
+#include "large_frames.h"
 #include "parts.h"
 #include "record/cluster_gate.h"
 #include "record/matroska.h"
@@ -82,6 +83,7 @@ struct Stream {
   gsize bytes_without_frame = 0;
   bool has_failed = false; ///< and the rest is salvaged
   ClusterGate gate;        ///< of what is salvaged
+  LargeFrames large;
 };
 
 struct RecordDemuxState {
@@ -138,10 +140,23 @@ add_frames (Self *self, CameraTracks &tracks, GstPad *pad)
   tracks.add_frames (pad, how);
 }
 
+GstPadProbeReturn
+on_stored (GstPad *pad, GstPadProbeInfo *info, gpointer self) noexcept
+{
+  const LargeFrames &large = state_in<Self> (self).stream.large;
+  const ObjectPtr<GstElement> demuxer (gst_pad_get_parent_element (pad));
+  info->data = large.put_back (
+      pad_of (demuxer.get (), "sink").get (), GST_PAD_PROBE_INFO_BUFFER (info));
+  return info->data ? GST_PAD_PROBE_OK : GST_PAD_PROBE_HANDLED;
+}
+
 void
 on_pad_added (GstElement *, GstPad *pad, gpointer self)
 {
   auto &tracks = state_in<Self> (self).coded;
+  if (g_str_has_prefix (GST_OBJECT_NAME (pad), "video_"))
+    gst_pad_add_probe (
+        pad, GST_PAD_PROBE_TYPE_BUFFER, on_stored, self, nullptr);
   if (g_str_has_prefix (GST_OBJECT_NAME (pad), "video_") &&
       !tracks.has_frames ())
     add_frames (as<Self> (self), tracks, pad);
@@ -223,7 +238,7 @@ read_head (RecordDemuxState &state, guint64 at, GstBuffer *bytes)
 
 /* A demuxer collects an element of any length that a stream claims. */
 GstPadProbeReturn
-on_bytes (GstPad *, GstPadProbeInfo *info, gpointer self) noexcept
+on_bytes (GstPad *pad, GstPadProbeInfo *info, gpointer self) noexcept
 {
   constexpr gsize kMostWithoutFrame = gsize (256) << 20;
   auto &state = state_in<Self> (self);
@@ -240,12 +255,23 @@ on_bytes (GstPad *, GstPadProbeInfo *info, gpointer self) noexcept
   if (!why && stream.bytes_without_frame > kMostWithoutFrame)
     why = "256 MB arrived without a frame: this is no stream of coded frames, "
           "or it is damaged.";
+  if (!why && pulled)
+    info->data = stream.large.pulled (pad, info->offset, bytes);
   if (!why)
     return GST_PAD_PROBE_OK;
   POST_ERROR (self, STREAM, DEMUX, why);
   gst_clear_buffer (reinterpret_cast<GstBuffer **> (&info->data));
   GST_PAD_PROBE_INFO_FLOW_RETURN (info) = GST_FLOW_ERROR;
   return GST_PAD_PROBE_HANDLED;
+}
+
+GstPadProbeReturn
+on_segment (GstPad *, GstPadProbeInfo *info, gpointer self) noexcept
+{
+  GstEvent *event = GST_PAD_PROBE_INFO_EVENT (info);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_SEGMENT)
+    state_in<Self> (self).stream.large.follow (*segment_of (event));
+  return GST_PAD_PROBE_OK;
 }
 
 GstPadProbeReturn
@@ -294,6 +320,8 @@ chain (GstPad *pad, GstObject *parent, GstBuffer *buffer) noexcept
   auto &state = state_in<Self> (self.get ());
   if (salvages (self.get ()))
     buffer = through_gate (state.stream.gate, buffer);
+  if (buffer)
+    buffer = state.stream.large.pushed (buffer);
   const GstFlowReturn flow =
       buffer ? state.chain (pad, parent, buffer) : GST_FLOW_OK;
   if (!state.stream.has_failed)
@@ -417,6 +445,8 @@ add_demuxer (Self *self)
       sink.get (), GST_PAD_PROBE_TYPE_QUERY_UPSTREAM, on_query, self, nullptr);
   gst_pad_add_probe (
       sink.get (), GST_PAD_PROBE_TYPE_BUFFER, on_bytes, self, nullptr);
+  gst_pad_add_probe (sink.get (), GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
+      on_segment, self, nullptr);
   state.chain = GST_PAD_CHAINFUNC (sink.get ());
   gst_pad_set_chain_function (sink.get (), chain);
 }

@@ -175,6 +175,16 @@ gap_like (GstEvent *gap, GstClockTime pts, GstClockTime duration)
   return own;
 }
 
+GstFlowReturn
+refuse_after_end (GstElement *sink, const std::string &location)
+{
+  POST_ERROR (sink, RESOURCE, WRITE,
+      location + " is finished, and what comes after the end of the stream, as "
+                 "after a seek, would overwrite it; set the element to NULL "
+                 "and choose another location");
+  return GST_FLOW_ERROR;
+}
+
 void
 post_write_error (
     GstElement *sink, std::string &problem, const std::string &why)

@@ -203,6 +203,10 @@ void answer_caps (GstQuery *query, CapsPtr own);
 /** A GAP event from @p pts for @p duration, otherwise as @p gap. */
 EventPtr gap_like (GstEvent *gap, GstClockTime pts, GstClockTime duration);
 
+/** Posts that @p location is finished, so that what comes after the end of the
+ * stream is refused. */
+GstFlowReturn refuse_after_end (GstElement *sink, const std::string &location);
+
 /** Posts why the file of @p sink could not be written, and keeps it in @p
  * problem for a property. Takes the object lock. */
 void post_write_error (

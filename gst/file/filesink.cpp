@@ -10,7 +10,9 @@
  * allocates the space before the stream begins, and a disk without it is an
  * error then and not when it is full.
  *
- * If the program is killed, all that came is in the file.
+ * If the program is killed, all that came is in the file. A flush, which a seek
+ * may bring, begins the file anew; after the end of the stream, the file is
+ * finished, and what comes then is an error.
  *
  * ## Example pipeline
  * |[
@@ -46,6 +48,7 @@ struct FileState {
 
   /* Streaming thread, and start and stop, which exclude it: */
   std::unique_ptr<FileWriter> file;
+  bool is_finished = false;
 };
 
 struct GstCodedExposureFileSink : Instance<GstBaseSink, FileState> {
@@ -71,6 +74,7 @@ start (GstBaseSink *sink) noexcept
   FileState &state = state_of (sink);
   const auto [location, reserve] = locked (sink, [&] {
     state.problem.clear ();
+    state.is_finished = false;
     return std::pair (state.location, state.reserve);
   });
   if (location.empty ()) {
@@ -91,6 +95,9 @@ GstFlowReturn
 render (GstBaseSink *sink, GstBuffer *buffer) noexcept
 {
   FileState &state = state_of (sink);
+  if (state.is_finished)
+    return refuse_after_end (
+        GST_ELEMENT (sink), locked (sink, [&] { return state.location; }));
   if (!state.file)
     return GST_FLOW_ERROR;
   /* To map all of them at once would copy them. */
@@ -116,13 +123,25 @@ render (GstBaseSink *sink, GstBuffer *buffer) noexcept
 bool
 finish (GstBaseSink *sink)
 {
-  const auto file = std::exchange (state_of (sink).file, nullptr);
+  FileState &state = state_of (sink);
+  const auto file = std::exchange (state.file, nullptr);
   if (!file)
     return true;
   const auto finished = file->finish ();
   if (!finished)
     fail (sink, finished.error ());
-  return finished.ok ();
+  return state.is_finished = finished.ok ();
+}
+
+/* What was written before a flush does not count. */
+void
+begin_anew (GstBaseSink *sink)
+{
+  FileState &state = state_of (sink);
+  if (!state.file)
+    return;
+  if (const auto restarted = state.file->restart (); !restarted)
+    fail (sink, restarted.error ());
 }
 
 gboolean
@@ -134,6 +153,8 @@ on_event (GstBaseSink *sink, GstEvent *event) noexcept
     if (segment->format == GST_FORMAT_BYTES)
       state.file->seek (segment->start);
   }
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
+    begin_anew (sink);
   if (GST_EVENT_TYPE (event) == GST_EVENT_EOS && !finish (sink)) {
     gst_event_unref (event);
     return FALSE;

@@ -62,7 +62,7 @@ try {
       ::open (path.c_str (), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (file < 0)
     return failure (path, errno);
-  std::unique_ptr<FileWriter> writer (new FileWriter (path, file, reserve > 0));
+  std::unique_ptr<FileWriter> writer (new FileWriter (path, file, reserve));
   if (lseek (file, 0, SEEK_CUR) < 0)
     return Error{"cannot write " + path +
                      ": it is a pipe, which takes no raw frames; write a file, "
@@ -114,10 +114,20 @@ FileWriter::pass_on ()
   }
 }
 
+/* A device has no length. */
+Result<void>
+FileWriter::restart ()
+{
+  if (ftruncate (file_, 0) != 0 && errno != EINVAL)
+    return failure (path_, errno);
+  position_ = end_ = passed_ = 0;
+  return reserve_space (path_, file_, reserve_);
+}
+
 Result<void>
 FileWriter::finish ()
 {
-  if (reserved_ && ftruncate (file_, off_t (end_)) != 0)
+  if (reserve_ > 0 && ftruncate (file_, off_t (end_)) != 0)
     return failure (path_, errno);
   return {};
 }

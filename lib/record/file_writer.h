@@ -40,19 +40,21 @@ public:
   /** Moves the position; what is skipped over is zero. */
   void seek (std::uint64_t position) { position_ = position; }
   std::uint64_t position () const { return position_; }
+  /** Forgets all that was written, and reserves the space anew. */
+  Result<void> restart ();
   /** At the end: the rest of the reserve is free again. */
   Result<void> finish ();
 
 private:
-  FileWriter (const std::string &path, int file, bool reserved)
-      : path_ (path), file_ (file), reserved_ (reserved)
+  FileWriter (const std::string &path, int file, std::uint64_t reserve)
+      : path_ (path), file_ (file), reserve_ (reserve)
   {
   }
   void pass_on ();
 
   const std::string path_;
   const int file_;
-  const bool reserved_;
+  const std::uint64_t reserve_;
   std::uint64_t position_ = 0;
   std::uint64_t end_ = 0;
   std::uint64_t passed_ = 0; ///< to the disk, from the beginning

@@ -156,6 +156,21 @@ TEST (FileWriter, FreesWhatItReservedAndDidNotUse)
   EXPECT_LT (scratch.allocated (), kReserve / 10);
 }
 
+TEST (FileWriter, BeginsAnewWithAnEmptyFileAndItsReserve)
+{
+  constexpr std::uint64_t kReserve = 30'000'000;
+  const Scratch scratch;
+  const auto file = open (scratch, kReserve);
+  const std::string bytes = noise (100'000), others = noise (1000);
+  ASSERT_TRUE (file->write (bytes.data (), bytes.size ()));
+  ASSERT_TRUE (file->restart ());
+  EXPECT_EQ (scratch.content ().size (), 0u);
+  EXPECT_GE (scratch.allocated (), kReserve);
+  ASSERT_TRUE (file->write (others.data (), others.size ()));
+  ASSERT_TRUE (file->finish ());
+  EXPECT_TRUE (scratch.content () == others);
+}
+
 /* A program that is killed calls no destructor. */
 TEST (FileWriter, HasAllBytesInTheFileAtOnce)
 {

@@ -172,7 +172,9 @@ OmeZarr::OmeZarr (const std::string &path, const StackFormat &format)
     : path_ (path), format_ (format), shard_ (pictures_in_shard (format))
 {
   std::error_code error;
-  fs::create_directories (path_ + "/0/c", error);
+  fs::remove_all (path_ + "/0/c", error); // a longer stack was here
+  if (!error)
+    fs::create_directories (path_ + "/0/c", error);
   if (error)
     throw Error{error.message (), ErrorCode::io};
   table_ = std::fopen ((path_ + "/times.csv").c_str (), "wb");

@@ -10,6 +10,10 @@
  * The file is finished at the end of the stream; until then it says that it is
  * not. A folder .ome.zarr can be read at any moment, also after a kill.
  *
+ * A flush, which a seek may bring, begins the file anew with the next picture;
+ * after the end of the stream, the file is finished, and pictures that come
+ * then are an error.
+ *
  * docs/formats.md describes the files.
  *
  * ## Example pipeline
@@ -50,6 +54,7 @@ struct Stack {
   std::string origin;         // of the pictures that come
   std::string written_origin; // of those in the file
   std::unique_ptr<StackFile> file;
+  bool is_finished = false;
 };
 
 struct GstCodedExposureStack : Instance<GstBaseSink, Stack> {
@@ -207,6 +212,9 @@ GstFlowReturn
 render (GstBaseSink *sink, GstBuffer *picture) noexcept
 {
   Stack &state = state_of (sink);
+  if (state.is_finished)
+    return refuse_after_end (
+        GST_ELEMENT (sink), locked (sink, [&] { return state.location; }));
   MappedFrame mapped (state.info, picture, GST_MAP_READ);
   if (!mapped)
     return refuse_buffer (sink, state.info, picture);
@@ -233,9 +241,12 @@ render (GstBaseSink *sink, GstBuffer *picture) noexcept
 bool
 finish (GstBaseSink *sink)
 {
+  Stack &state = state_of (sink);
   try {
-    if (const auto file = std::exchange (state_of (sink).file, nullptr))
+    if (const auto file = std::exchange (state.file, nullptr)) {
       file->finish ();
+      state.is_finished = true;
+    }
     return true;
   } catch (const Error &error) {
     fail (sink, error);
@@ -243,6 +254,14 @@ finish (GstBaseSink *sink)
     fail (sink, Error{error.what ()});
   }
   return false;
+}
+
+/* What was written before a flush does not count. */
+void
+begin_anew (Stack &state)
+{
+  state.file.reset ();
+  state.written_origin.clear ();
 }
 
 /* Schedule and mapping of coded frames, or the provenance of pictures. */
@@ -262,6 +281,8 @@ on_event (GstBaseSink *sink, GstEvent *event) noexcept
 {
   if (GST_EVENT_TYPE (event) == GST_EVENT_TAG)
     take_origin (state_of (sink), event);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
+    begin_anew (state_of (sink));
   if (GST_EVENT_TYPE (event) == GST_EVENT_EOS && !finish (sink)) {
     gst_event_unref (event);
     return FALSE;
@@ -299,6 +320,7 @@ start (GstBaseSink *sink) noexcept
   });
   state.origin.clear ();
   state.written_origin.clear ();
+  state.is_finished = false;
   return form_of (GST_ELEMENT (sink), location) != nullptr;
 }
 

@@ -192,7 +192,7 @@ public:
 
   void add_origin (const std::string &json) override;
   void add (const StackRow &row, const guint8 *pixels, gsize stride) override;
-  void finish () override;
+  void finish (bool whole) override;
 
 private:
   void flush ();
@@ -319,12 +319,12 @@ Hdf5::flush ()
 }
 
 void
-Hdf5::finish ()
+Hdf5::finish (bool whole)
 {
   const std::lock_guard lock (library ());
   flush ();
   check (H5Adelete (file_, "status"));
-  set_attribute (file_, "status", "complete");
+  set_attribute (file_, "status", whole ? "complete" : kBrokenOff);
   for (Column &column : columns_)
     column.close ();
   check (file_.reset ());

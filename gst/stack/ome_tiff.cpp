@@ -166,7 +166,7 @@ public:
     origins_.push_back ({rows_.size (), json});
   }
   void add (const StackRow &row, const guint8 *pixels, gsize stride) override;
-  void finish () override;
+  void finish (bool whole) override;
 
 private:
   static int on_error (
@@ -239,12 +239,12 @@ OmeTiff::add (const StackRow &row, const guint8 *pixels, gsize stride)
 }
 
 void
-OmeTiff::finish ()
+OmeTiff::finish (bool whole)
 {
   errno = 0;
   check (TIFFSetDirectory (tiff_.get (), 0) == 1);
   set (TIFFTAG_IMAGEDESCRIPTION,
-      ome_xml (format_, rows_, origins_, "").c_str ());
+      ome_xml (format_, rows_, origins_, whole ? "" : kBrokenOff).c_str ());
   check (TIFFRewriteDirectory (tiff_.get ()) == 1);
   tiff_.reset (); // writes the rest
   check (true);

@@ -136,7 +136,7 @@ public:
 
   void add_origin (const std::string &json) override;
   void add (const StackRow &row, const guint8 *pixels, gsize stride) override;
-  void finish () override;
+  void finish (bool whole) override;
 
 private:
   Json codecs () const;
@@ -326,13 +326,13 @@ OmeZarr::finish_shard ()
 }
 
 void
-OmeZarr::finish ()
+OmeZarr::finish (bool whole)
 {
   if (current_)
     finish_shard ();
   if (std::fclose (std::exchange (table_, nullptr)) != 0)
     fail ();
-  describe ("complete");
+  describe (whole ? "complete" : kBrokenOff);
 }
 
 } // namespace

@@ -8,7 +8,8 @@
  * or an OME-Zarr folder (.ome.zarr), with the time, the slot, the number and
  * the synchronisation of each, and the schedule. No picture stays in memory.
  * The file is finished at the end of the stream; until then it says that it is
- * not. A folder .ome.zarr can be read at any moment, also after a kill.
+ * not, also if the stream breaks off, and then it has all pictures that came. A
+ * folder .ome.zarr can be read at any moment, also after a kill.
  *
  * A flush, which a seek may bring, begins the file anew with the next picture;
  * after the end of the stream, the file is finished, and pictures that come
@@ -237,14 +238,15 @@ render (GstBaseSink *sink, GstBuffer *picture) noexcept
   }
 }
 
-/* False, with an error: the file is not complete. */
+/* @whole: at the end of the stream. False, with an error: the file lacks
+ * pictures. */
 bool
-finish (GstBaseSink *sink)
+finish (GstBaseSink *sink, bool whole)
 {
   Stack &state = state_of (sink);
   try {
     if (const auto file = std::exchange (state.file, nullptr)) {
-      file->finish ();
+      file->finish (whole);
       state.is_finished = true;
     }
     return true;
@@ -283,7 +285,7 @@ on_event (GstBaseSink *sink, GstEvent *event) noexcept
     take_origin (state_of (sink), event);
   if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
     begin_anew (state_of (sink));
-  if (GST_EVENT_TYPE (event) == GST_EVENT_EOS && !finish (sink)) {
+  if (GST_EVENT_TYPE (event) == GST_EVENT_EOS && !finish (sink, true)) {
     gst_event_unref (event);
     return FALSE;
   }
@@ -327,7 +329,7 @@ start (GstBaseSink *sink) noexcept
 gboolean
 stop (GstBaseSink *sink) noexcept
 {
-  return finish (sink);
+  return finish (sink, false);
 }
 
 PropertyTable<Stack>

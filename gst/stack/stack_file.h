@@ -43,6 +43,10 @@ struct StackOrigin {
   std::string json;
 };
 
+/** The status of a file with all pictures until the stream broke off. */
+inline constexpr const char *kBrokenOff =
+    "unfinished: the stream stopped before its end";
+
 /** A file that is being written. Functions throw Error; after that, only the
  * destructor may be called. A file without finish () says that it is
  * unfinished. */
@@ -55,7 +59,8 @@ public:
   /** @p stride  bytes from a row to the next. */
   virtual void add (
       const StackRow &row, const guint8 *pixels, gsize stride) = 0;
-  virtual void finish () = 0;
+  /** @p whole: the stream has ended. If not, the file says so. */
+  virtual void finish (bool whole) = 0;
 };
 
 /** What opens such a file, or folder. Throws Error. */

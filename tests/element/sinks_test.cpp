@@ -183,6 +183,21 @@ TEST_P (StackSink, AFlushBeginsTheFileAnew)
   EXPECT_EQ (sink->error (), "");
 }
 
+TEST_P (StackSink, AStreamThatBreaksOffIsNotComplete)
+{
+  for (const bool whole : {false, true}) {
+    SetUp ();
+    push_all (20);
+    if (whole)
+      end ();
+    gst_element_set_state (sink->element (), GST_STATE_NULL);
+    EXPECT_EQ (head ().find ("unfinished: the stream stopped before its end") ==
+                   std::string::npos,
+        whole);
+    EXPECT_EQ (sink->error (), "");
+  }
+}
+
 const auto name_of = [] (const auto &info) {
   std::string name = info.param;
   std::erase (name, '.');

@@ -13,8 +13,9 @@
  * The stream does not wait for the disk: a thread of its own writes the frames.
  * At the end of the stream, the element waits for what is still written, and
  * for an event whose #codedexposure-keep:after has not passed, it keeps what
- * there is. Frames of one format and setup are kept; with others, it begins
- * anew.
+ * there is. Frames of one format and setup are kept; with others, and with a
+ * flush, which a seek may bring, it keeps such an event in the same way and
+ * begins anew.
  *
  * The memory for the frames is bounded by #codedexposure-keep:max-bytes. Where
  * that is reached, a recording is shorter than #codedexposure-keep:length, and
@@ -180,7 +181,7 @@ finish (GstCodedExposureKeep *self)
   state.is_done.wait (lock, idle);
 }
 
-/* An event is kept before frames of another format or setup come. */
+/* An event is kept before frames of another format, setup or place come. */
 void
 begin_anew (GstCodedExposureKeep *self)
 {
@@ -306,15 +307,6 @@ follow_tags (GstCodedExposureKeep *self, GstEvent *event)
   state.frames.tag.reset (gst_event_ref (event));
 }
 
-void
-forget (KeepState &state)
-{
-  const std::lock_guard lock (state.mutex);
-  state.frames.clear ();
-  state.followed.reset ();
-  state.next.reset ();
-}
-
 gboolean
 sink_event (GstBaseTransform *base, GstEvent *event) noexcept
 {
@@ -323,7 +315,7 @@ sink_event (GstBaseTransform *base, GstEvent *event) noexcept
   if (GST_EVENT_TYPE (event) == GST_EVENT_TAG)
     follow_tags (self, event);
   else if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
-    forget (self->state);
+    begin_anew (self);
   else if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
     finish (self);
   return base_transform_class ()->sink_event (base, event);

@@ -89,6 +89,19 @@ protected:
     for (guint64 k = first; k <= last; k++)
       push (k, value);
   }
+  void flush ()
+  {
+    keep_->push_event (gst_event_new_flush_start ());
+    keep_->push_event (gst_event_new_flush_stop (TRUE));
+    push_segment (1);
+  }
+  void push_segment (double rate)
+  {
+    GstSegment segment;
+    gst_segment_init (&segment, GST_FORMAT_TIME);
+    segment.rate = rate;
+    keep_->push_event (gst_event_new_segment (&segment));
+  }
   /* What was asked for before is written then. */
   void end () { keep_->push_event (gst_event_new_eos ()); }
   void keep () { g_object_set (keep_->element (), "keep", TRUE, nullptr); }
@@ -221,8 +234,7 @@ TEST_F (Keep, OnlyFramesOfOneFormatAndSetup)
   EXPECT_EQ (keep_->posted<Kept> ().value ().frame, 7u);
   begin ();
   push_all (0, 4);
-  keep_->push_event (gst_event_new_flush_start ());
-  keep_->push_event (gst_event_new_flush_stop (TRUE));
+  flush ();
   keep ();
   end ();
   EXPECT_EQ (keep_->warning (), "There is no coded frame to be kept yet; keep "
@@ -242,6 +254,19 @@ TEST_F (Keep, AnEventIsKeptBeforeAnotherSetup)
   ASSERT_TRUE (kept);
   EXPECT_EQ (kept->frames, 34u);
   EXPECT_FALSE (keep_->posted<Kept> ());
+}
+
+TEST_F (Keep, AnEventIsKeptBeforeAFlush)
+{
+  begin ("event=mean:20");
+  push_all (0, 30, 50);
+  push_all (31, 33, 150);
+  flush ();
+  push_all (100, 102, 150);
+  keep ();
+  end ();
+  EXPECT_EQ (keep_->posted<Kept> ().value ().frames, 34u);
+  EXPECT_EQ (keep_->posted<Kept> ().value ().frame, 100u);
 }
 
 TEST_F (Keep, ATimeThatIsLongerThanWhatIsRememberedIsRefused)

@@ -14,8 +14,9 @@
  * At the end of the stream, the element waits for what is still written, and
  * for an event whose #codedexposure-keep:after has not passed, it keeps what
  * there is. Frames of one format and setup are kept; with others, and with a
- * flush, which a seek may bring, it keeps such an event in the same way and
- * begins anew.
+ * flush or a segment that goes back or the other way, which a seek may bring,
+ * it keeps such an event in the same way and begins anew. A recording is in the
+ * order of time, also if the frames came backwards.
  *
  * The memory for the frames is bounded by #codedexposure-keep:max-bytes. Where
  * that is reached, a recording is shorter than #codedexposure-keep:length, and
@@ -86,6 +87,7 @@ struct KeepState {
   std::optional<GstVideoInfo> info;
   std::optional<guint64> last; ///< number of a frame
   int tagged_bits = 0;
+  bool has_new_segment = false; ///< since the last frame
 
   /** Of what follows; taken after the object lock where both are held. Never
    * held while it writes or posts. */
@@ -200,10 +202,15 @@ keep_what_is_due (GstCodedExposureKeep *self, GstClockTime pts)
   const std::lock_guard lock (state.mutex);
   if (!state.followed || state.tasks > 0)
     return;
+  const bool goes_back = GST_BASE_TRANSFORM (self)->segment.rate < 0;
+  const auto since = [&] (GstClockTime time) {
+    return goes_back ? gint64 (time - pts) : gint64 (pts - time);
+  };
   const GstClockTime event = *state.followed;
   const GstClockTime oldest =
       GST_BUFFER_PTS (state.frames.buffers.front ().get ());
-  if (pts < event + state.in_force.after && (oldest < event || pts == event))
+  if (since (event) < gint64 (state.in_force.after) &&
+      (since (oldest) > since (event) || pts == event))
     return;
   state.followed = std::exchange (state.next, std::nullopt);
   begin_task (self);
@@ -248,6 +255,18 @@ watch (GstCodedExposureKeep *self, GstBuffer *frame)
     on_event (self, frame, *jump);
 }
 
+/* Whether the frame of a new segment follows those that are remembered. */
+bool
+follows (const KeepState &state, GstClockTime pts, double rate)
+{
+  const auto &buffers = state.frames.buffers;
+  if (buffers.empty ())
+    return true;
+  const GstClockTime first = GST_BUFFER_PTS (buffers.front ().get ());
+  const GstClockTime last = GST_BUFFER_PTS (buffers.back ().get ());
+  return rate < 0 ? first >= last && last > pts : first <= last && last < pts;
+}
+
 GstFlowReturn
 transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
 {
@@ -258,6 +277,9 @@ transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
     return GST_FLOW_OK;
   if (!holds_frame (base, *state.info, frame))
     return GST_FLOW_ERROR;
+  if (std::exchange (state.has_new_segment, false) &&
+      !follows (state, pts, base->segment.rate))
+    begin_anew (self);
   BufferPtr kept = kept_frame (frame);
   locked (state.mutex, [&] {
     state.frames.buffers.push_back (std::move (kept));
@@ -316,6 +338,8 @@ sink_event (GstBaseTransform *base, GstEvent *event) noexcept
     follow_tags (self, event);
   else if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
     begin_anew (self);
+  else if (GST_EVENT_TYPE (event) == GST_EVENT_SEGMENT)
+    self->state.has_new_segment = true;
   else if (GST_EVENT_TYPE (event) == GST_EVENT_EOS)
     finish (self);
   return base_transform_class ()->sink_event (base, event);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "kept_file.h"
 
+#include <algorithm>
 #include <cinttypes>
 #include <cstdio>
 #include <filesystem>
@@ -115,7 +116,7 @@ KeptFrames::length () const
     return 0;
   const GstClockTime first = GST_BUFFER_PTS (buffers.front ().get ());
   const GstClockTime last = GST_BUFFER_PTS (buffers.back ().get ());
-  return last > first ? last - first : 0;
+  return std::max (first, last) - std::min (first, last);
 }
 
 void
@@ -145,6 +146,9 @@ KeptFrames::copy () const
     made.tag.reset (gst_event_ref (tag.get ()));
   for (const BufferPtr &buffer : buffers)
     made.buffers.emplace_back (gst_buffer_ref (buffer.get ()));
+  if (!buffers.empty () && GST_BUFFER_PTS (buffers.back ().get ()) <
+                               GST_BUFFER_PTS (buffers.front ().get ()))
+    std::ranges::reverse (made.buffers);
   return made;
 }
 

@@ -19,12 +19,12 @@ struct KeptFrames {
   std::deque<BufferPtr> buffers;
   std::uint64_t bytes = 0;
 
-  /** From the first frame to the last. */
+  /** From the first frame to the last, also where time goes back. */
   GstClockTime length () const;
   /** Forgets the oldest frames until it is as short and small as that. */
   void limit (GstClockTime longest, std::uint64_t most_bytes);
   void clear ();
-  /** References to all of it. */
+  /** References to all of it, in the order of their times. */
   KeptFrames copy () const;
 };
 

@@ -89,6 +89,11 @@ protected:
     for (guint64 k = first; k <= last; k++)
       push (k, value);
   }
+  void push_all_back (guint64 first, guint64 last, int value = 50)
+  {
+    for (guint64 k = first + 1; k-- > last;)
+      push (k, value);
+  }
   void flush ()
   {
     keep_->push_event (gst_event_new_flush_start ());
@@ -267,6 +272,65 @@ TEST_F (Keep, AnEventIsKeptBeforeAFlush)
   end ();
   EXPECT_EQ (keep_->posted<Kept> ().value ().frames, 34u);
   EXPECT_EQ (keep_->posted<Kept> ().value ().frame, 100u);
+}
+
+TEST_F (Keep, FramesThatComeBackwardsAreKeptInTheOrderOfTime)
+{
+  begin ("length=400000000");
+  push_segment (-1);
+  push_all_back (30, 3);
+  keep ();
+  end ();
+  const auto kept = keep_->posted<Kept> ();
+  ASSERT_TRUE (kept);
+  EXPECT_EQ (kept->frame, 3u);
+  EXPECT_EQ (kept->frames, 11u);
+  EXPECT_EQ (kept->duration, 10 * kPeriod);
+  const Frames frames = read ("event-frame000003.mkv");
+  ASSERT_EQ (frames.numbers.size (), 11u);
+  for (std::size_t k = 0; k < 11; k++) {
+    EXPECT_EQ (frames.numbers[k], 3 + k);
+    EXPECT_EQ (frames.times[k], kBegin + (3 + k) * kPeriod);
+  }
+}
+
+TEST_F (Keep, FollowsAnEventBackwardsForItsTime)
+{
+  begin ("event=mean:20 after=400000000");
+  push_segment (-1);
+  push_all_back (80, 41, 50);
+  push_all_back (40, 0, 150);
+  end ();
+  const auto kept = keep_->posted<Kept> ();
+  ASSERT_TRUE (kept);
+  EXPECT_EQ (kept->frame, 30u);
+  EXPECT_EQ (kept->frames, 51u);
+}
+
+TEST_F (Keep, ASegmentThatGoesBackOrTheOtherWayBeginsAnew)
+{
+  begin ();
+  push_all (0, 10);
+  push_segment (1);
+  push_all (4, 8);
+  push_segment (1); // it goes on
+  push_all (9, 12);
+  keep ();
+  end ();
+  const auto forwards = keep_->posted<Kept> ();
+  ASSERT_TRUE (forwards);
+  EXPECT_EQ (forwards->frame, 4u);
+  EXPECT_EQ (forwards->frames, 9u);
+
+  begin ("event=mean:20");
+  push_all (0, 30, 50);
+  push_all (31, 33, 150);
+  push_segment (-1);
+  push_all_back (32, 28, 150);
+  keep ();
+  end ();
+  EXPECT_EQ (keep_->posted<Kept> ().value ().frames, 34u);
+  EXPECT_EQ (keep_->posted<Kept> ().value ().frames, 5u);
 }
 
 TEST_F (Keep, ATimeThatIsLongerThanWhatIsRememberedIsRefused)

@@ -11,8 +11,9 @@
  * error then and not when it is full.
  *
  * If the program is killed, all that came is in the file. A flush, which a seek
- * may bring, begins the file anew; after the end of the stream, the file is
- * finished, and what comes then is an error.
+ * may bring, begins the file anew, and so does a run after the READY state;
+ * after the end of the stream, the file is finished, and what comes then is an
+ * error.
  *
  * ## Example pipeline
  * |[
@@ -133,15 +134,18 @@ finish (GstBaseSink *sink)
   return state.is_finished = finished.ok ();
 }
 
-/* What was written before a flush does not count. */
-void
-begin_anew (GstBaseSink *sink)
+/* What was written before a flush, or in a run that did not end, does not
+ * count. False, with an error: the space cannot be reserved again. */
+bool
+begin_anew (GstElement *element)
 {
-  FileState &state = state_of (sink);
+  const FileState &state = state_of (element);
   if (!state.file)
-    return;
-  if (const auto restarted = state.file->restart (); !restarted)
-    fail (sink, restarted.error ());
+    return true;
+  const auto restarted = state.file->restart ();
+  if (!restarted)
+    fail (GST_BASE_SINK (element), restarted.error ());
+  return restarted.ok ();
 }
 
 gboolean
@@ -154,7 +158,7 @@ on_event (GstBaseSink *sink, GstEvent *event) noexcept
       state.file->seek (segment->start);
   }
   if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
-    begin_anew (sink);
+    begin_anew (GST_ELEMENT (sink));
   if (GST_EVENT_TYPE (event) == GST_EVENT_EOS && !finish (sink)) {
     gst_event_unref (event);
     return FALSE;
@@ -200,10 +204,13 @@ properties ()
           kReadOnly, [] (const FileState &state) { return state.problem; }}};
 }
 
+constexpr StateHooks kRun{.begin = begin_anew};
+
 void
 set_up (gpointer klass)
 {
   install_state<GstCodedExposureFileSink, properties> (klass);
+  install_run<kRun> (klass);
   describe_element (klass, "Coded exposure file sink", "Sink/File",
       "Writes a stream to a file at the speed of the disk", {});
   add_pad_template (klass, "sink", {.caps = "ANY"});

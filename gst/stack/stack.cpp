@@ -11,9 +11,9 @@
  * not, also if the stream breaks off, and then it has all pictures that came. A
  * folder .ome.zarr can be read at any moment, also after a kill.
  *
- * A flush, which a seek may bring, begins the file anew with the next picture;
- * after the end of the stream, the file is finished, and pictures that come
- * then are an error.
+ * A flush, which a seek may bring, begins the file anew with the next picture,
+ * and so does a run after the READY state; after the end of the stream, the
+ * file is finished, and pictures that come then are an error.
  *
  * docs/formats.md describes the files.
  *
@@ -189,6 +189,7 @@ open_file (GstBaseSink *sink, const FrameMeta &meta)
   const Form *form = form_of (GST_ELEMENT (sink), location);
   format.big = form->open == kTiff && needs_big (sink, format, classic);
   state.file = form->open (location, format);
+  state.written_origin.clear ();
 }
 
 StackRow
@@ -247,7 +248,7 @@ finish (GstBaseSink *sink, bool whole)
   try {
     if (const auto file = std::exchange (state.file, nullptr)) {
       file->finish (whole);
-      state.is_finished = true;
+      state.is_finished = whole;
     }
     return true;
   } catch (const Error &error) {
@@ -256,14 +257,6 @@ finish (GstBaseSink *sink, bool whole)
     fail (sink, Error{error.what ()});
   }
   return false;
-}
-
-/* What was written before a flush does not count. */
-void
-begin_anew (Stack &state)
-{
-  state.file.reset ();
-  state.written_origin.clear ();
 }
 
 /* Schedule and mapping of coded frames, or the provenance of pictures. */
@@ -284,7 +277,7 @@ on_event (GstBaseSink *sink, GstEvent *event) noexcept
   if (GST_EVENT_TYPE (event) == GST_EVENT_TAG)
     take_origin (state_of (sink), event);
   if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
-    begin_anew (state_of (sink));
+    state_of (sink).file.reset (); // what was written does not count
   if (GST_EVENT_TYPE (event) == GST_EVENT_EOS && !finish (sink, true)) {
     gst_event_unref (event);
     return FALSE;
@@ -321,15 +314,14 @@ start (GstBaseSink *sink) noexcept
     return state.location;
   });
   state.origin.clear ();
-  state.written_origin.clear ();
   state.is_finished = false;
   return form_of (GST_ELEMENT (sink), location) != nullptr;
 }
 
-gboolean
-stop (GstBaseSink *sink) noexcept
+void
+end_run (GstElement *element)
 {
-  return finish (sink, false);
+  finish (GST_BASE_SINK (element), false);
 }
 
 PropertyTable<Stack>
@@ -356,10 +348,13 @@ properties ()
           kReadOnly, [] (const Stack &state) { return state.problem; }}};
 }
 
+constexpr StateHooks kRun{.end = end_run};
+
 void
 set_up (gpointer klass)
 {
   install_state<GstCodedExposureStack, properties> (klass);
+  install_run<kRun> (klass);
   describe_element (klass, "Coded exposure stack", "Sink/File/Video",
       "Writes pictures with their times to OME-TIFF, HDF5 or OME-Zarr",
       {"sink"});
@@ -368,7 +363,6 @@ set_up (gpointer klass)
   sink_class->event = on_event;
   sink_class->render = render;
   sink_class->start = start;
-  sink_class->stop = stop;
 }
 
 void

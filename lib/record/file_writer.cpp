@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cstring>
 #include <exception>
+#include <utility>
 
 #include <fcntl.h>
 #include <sys/statvfs.h>
@@ -118,9 +119,11 @@ FileWriter::pass_on ()
 Result<void>
 FileWriter::restart ()
 {
+  position_ = passed_ = 0;
+  if (std::exchange (end_, 0) == 0)
+    return {};
   if (ftruncate (file_, 0) != 0 && errno != EINVAL)
     return failure (path_, errno);
-  position_ = end_ = passed_ = 0;
   return reserve_space (path_, file_, reserve_);
 }
 

@@ -53,6 +53,11 @@ protected:
     push_segment (format);
   }
   void end () { sink->push_event (gst_event_new_eos ()); }
+  void run_again ()
+  {
+    gst_element_set_state (sink->element (), GST_STATE_READY);
+    gst_element_set_state (sink->element (), GST_STATE_PLAYING);
+  }
 
   std::string path;
   std::optional<ElementHarness> sink;
@@ -82,6 +87,18 @@ TEST_F (FileSink, AFlushBeginsTheFileAnew)
   end ();
   EXPECT_EQ (content (path), "short");
   EXPECT_EQ (sink->error (), "");
+}
+
+TEST_F (FileSink, AnotherRunBeginsTheFileAnew)
+{
+  begin ("codedexposure-filesink", "file");
+  sink->set_caps ("video/x-matroska");
+  EXPECT_EQ (push ("a long recording"), GST_FLOW_OK);
+  run_again ();
+  push_segment (GST_FORMAT_BYTES);
+  EXPECT_EQ (push ("short"), GST_FLOW_OK);
+  end ();
+  EXPECT_EQ (content (path), "short");
 }
 
 TEST_F (FileSink, AFinishedFileIsKept)
@@ -183,6 +200,20 @@ TEST_P (StackSink, AFlushBeginsTheFileAnew)
   EXPECT_EQ (sink->error (), "");
 }
 
+TEST_P (StackSink, AnotherRunBeginsTheFileAnew)
+{
+  push_all (20);
+  end ();
+  const std::uintmax_t expected = size ();
+  SetUp ();
+  push_all (kPictures);
+  run_again ();
+  push_segment (GST_FORMAT_TIME);
+  push_all (20);
+  end ();
+  EXPECT_EQ (size (), expected);
+}
+
 TEST_P (StackSink, AStreamThatBreaksOffIsNotComplete)
 {
   for (const bool whole : {false, true}) {
@@ -190,7 +221,7 @@ TEST_P (StackSink, AStreamThatBreaksOffIsNotComplete)
     push_all (20);
     if (whole)
       end ();
-    gst_element_set_state (sink->element (), GST_STATE_NULL);
+    gst_element_set_state (sink->element (), GST_STATE_READY);
     EXPECT_EQ (head ().find ("unfinished: the stream stopped before its end") ==
                    std::string::npos,
         whole);

@@ -183,13 +183,17 @@ finish (GstCodedExposureKeep *self)
   state.is_done.wait (lock, idle);
 }
 
-/* An event is kept before frames of another format, setup or place come. */
+/* An event is kept before frames of another format, setup or place come, and
+ * that these differ from those before is none. */
 void
 begin_anew (GstCodedExposureKeep *self)
 {
+  KeepState &state = self->state;
   finish (self);
-  const std::lock_guard lock (self->state.mutex);
-  self->state.frames.clear ();
+  if (state.events)
+    state.events.emplace (EventRule (state.events->rule ()));
+  const std::lock_guard lock (state.mutex);
+  state.frames.clear ();
 }
 
 /* An event is followed for its time, or until its own frame would be forgotten,

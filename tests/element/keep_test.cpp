@@ -274,6 +274,22 @@ TEST_F (Keep, AnEventIsKeptBeforeAFlush)
   EXPECT_EQ (keep_->posted<Kept> ().value ().frame, 100u);
 }
 
+TEST_F (Keep, AnotherPlaceOrSetupIsNoEvent)
+{
+  begin ("event=mean:20");
+  push_all (0, 30, 50);
+  flush ();
+  push_all (100, 130, 150);
+  push_segment (1);
+  push_all (60, 90, 50);
+  tell ("sequential:3x3");
+  push_all (91, 120, 150);
+  EXPECT_FALSE (keep_->posted<EventFound> ());
+  push_all (121, 122, 50);
+  EXPECT_TRUE (keep_->posted<EventFound> ());
+  end ();
+}
+
 TEST_F (Keep, FramesThatComeBackwardsAreKeptInTheOrderOfTime)
 {
   begin ("length=400000000");

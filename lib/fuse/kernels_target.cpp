@@ -11,8 +11,9 @@ namespace codedexposure::CODEDEXPOSURE_TARGET
 
 extern const fuse::Kernels kernels;
 const fuse::Kernels kernels = {CODEDEXPOSURE_TARGET_NAME, filter_squared,
-    filter_add, split_pairs, split, join, sum, max, blur, compare, rate,
-    fade_ratio, prefer, share, sum_blocks, weigh, to_steps, pair, to_bytes,
-    to_words, shrink, settle, miss, move, convolve};
+    filter_add, split_parts<std::int32_t>, split_parts<float>, join, sum, max,
+    blur, compare, rate, fade_ratio, prefer, share, sum_blocks, weigh, to_steps,
+    pair, to_pixels<std::uint8_t>, to_pixels<std::uint16_t>, shrink, settle,
+    miss, move, convolve};
 
 } // namespace codedexposure::CODEDEXPOSURE_TARGET

@@ -95,7 +95,7 @@ join_period (
 }
 
 template <typename T>
-CODEDEXPOSURE_INLINE void
+void
 split_parts (const fuse::Parts &parts, const T *from, T *to)
 {
   int x = 0;
@@ -108,19 +108,6 @@ split_parts (const fuse::Parts &parts, const T *from, T *to)
   for (int c = 0; c < parts.period; c++)
     for (int at = x + c; at < parts.count; at += parts.period)
       to[c * parts.stride + at / parts.period] = from[at];
-}
-
-inline void
-split_pairs (
-    const fuse::Parts &parts, const std::int32_t *from, std::int32_t *to)
-{
-  split_parts (parts, from, to);
-}
-
-inline void
-split (const fuse::Parts &parts, const float *from, float *to)
-{
-  split_parts (parts, from, to);
 }
 
 inline void

@@ -306,27 +306,13 @@ pair (std::int32_t *values, int count)
 }
 
 template <typename Pixel>
-CODEDEXPOSURE_INLINE void
+void
 to_pixels (const float *light, float scale, float largest, int count,
     Pixel *__restrict to)
 {
   for (int x = 0; x < count; x++)
     to[x] =
         Pixel (std::int32_t (clamped (light[x] * scale + 0.5f, 0.0f, largest)));
-}
-
-inline void
-to_bytes (
-    const float *light, float scale, float largest, int count, std::uint8_t *to)
-{
-  to_pixels (light, scale, largest, count, to);
-}
-
-inline void
-to_words (const float *light, float scale, float largest, int count,
-    std::uint16_t *to)
-{
-  to_pixels (light, scale, largest, count, to);
 }
 
 } // namespace codedexposure::CODEDEXPOSURE_TARGET

@@ -8,6 +8,7 @@
 #include <functional>
 #include <numbers>
 
+#include "base/statistics.h"
 #include "canvas.h"
 
 namespace codedexposure
@@ -163,17 +164,12 @@ float
 usual (const Image<float> &dx, const Image<float> &dy)
 {
   std::vector<float> lengths;
-  for (int y = 0; y < dx.height (); y++)
-    for (int x = 0; x < dx.width (); x++)
-      if (const float length = std::hypot (dx.at (x, y), dy.at (x, y));
-          length > 0.0f)
-        lengths.push_back (length);
-  if (lengths.empty ())
-    return 1e-6f;
-  const auto place =
-      lengths.begin () + std::ptrdiff_t (lengths.size () * 9 / 10);
-  std::nth_element (lengths.begin (), place, lengths.end ());
-  return *place;
+  each_pixel (dx, [&] (int x, int y) {
+    if (const float length = std::hypot (dx.at (x, y), dy.at (x, y));
+        length > 0.0f)
+      lengths.push_back (length);
+  });
+  return lengths.empty () ? 1e-6f : quantile (std::move (lengths), 0.9);
 }
 
 /** Direction as hue, length as brightness. */

@@ -11,9 +11,9 @@
 
 #include <Eigen/Cholesky>
 
-#include "base/pixels.h"
 #include "base/try.h"
 #include "base/view_check.h"
+#include "extract/saturation.h"
 
 namespace codedexposure
 {
@@ -485,11 +485,7 @@ LiveMoire::State::solve (ImageView<const Pixel> frame)
     for (std::size_t i = 0; i < phasors->at.size (); i++)
       shown += phasors->shows (i);
   reading.coverage = double (shown) / double (x.at.size () + y.at.size ());
-  for (int row = 0; row < frame.height; row++)
-    reading.saturated += std::uint64_t (
-        std::count_if (frame.row (row), frame.row (row) + frame.width,
-            [largest = largest_pixel_of<Pixel> (options.bits)] (
-                Pixel p) { return p >= largest; }));
+  reading.saturated = count_saturated (frame, options.bits);
   return reading;
 }
 

@@ -8,6 +8,8 @@
 #include <numeric>
 #include <optional>
 
+#include "base/statistics.h"
+
 namespace codedexposure::fuse
 {
 
@@ -69,14 +71,6 @@ find_runs (const float *values, int count, std::vector<Run> &runs)
     if (any)
       add_block (runs, block);
   }
-}
-
-double
-median_of (std::vector<double> values)
-{
-  const auto middle = values.begin () + std::ptrdiff_t (values.size () / 2);
-  std::ranges::nth_element (values, middle);
-  return *middle;
 }
 
 } // namespace
@@ -194,7 +188,7 @@ MotionFilter::make_set (std::span<const SceneClass> classes,
         per_neighbour);
   }
   const double ratio =
-      of_partner.empty () ? 0.0 : median_of (predicted) / median_of (partner);
+      of_partner.empty () ? 0.0 : median (predicted) / median (partner);
   const double part = of_partner.empty () ? 1.0 : 0.5;
   const auto set_bank = [] (FilterBank &bank, const auto &chunks_of,
                             double by) {

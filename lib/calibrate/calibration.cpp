@@ -190,9 +190,9 @@ Calibration::find (const Pattern &pattern)
 
 template <typename Pixel>
 Result<void>
-Calibration::add_frame (
-    const Pattern &pattern, ImageView<const Pixel> frame, int largest)
-{
+Calibration::add (
+    const Pattern &pattern, ImageView<const Pixel> frame, int bits)
+try {
   Slot *slot = find (pattern);
   if (slot == nullptr)
     return Error{
@@ -207,6 +207,7 @@ Calibration::add_frame (
                  " comes after this pattern was evaluated; add all frames of a "
                  "pattern before those of the next one"};
   evaluate_pairs (pattern);
+  const Pixel largest = largest_pixel_of<Pixel> (bits);
   /* 16 bits hold a DN's parts, too. */
   unit_ = std::exp2 (float (std::bit_width (unsigned (largest))) - 16.0f);
   shrink_gratings (pattern);
@@ -230,24 +231,14 @@ Calibration::add_frame (
   }
   slot->frames++;
   return {};
-}
-
-Result<void>
-Calibration::add (const Pattern &pattern, ImageView<const std::uint8_t> frame)
-try {
-  return add_frame (pattern, frame, 255);
 } catch (const std::bad_alloc &) {
   return out_of_memory ();
 }
 
-Result<void>
-Calibration::add (
-    const Pattern &pattern, ImageView<const std::uint16_t> frame, int bits)
-try {
-  return add_frame (pattern, frame, largest_pixel_of<std::uint16_t> (bits));
-} catch (const std::bad_alloc &) {
-  return out_of_memory ();
-}
+template Result<void> Calibration::add (
+    const Pattern &, ImageView<const std::uint8_t>, int);
+template Result<void> Calibration::add (
+    const Pattern &, ImageView<const std::uint16_t>, int);
 
 std::vector<Pattern>
 Calibration::missing () const

@@ -68,12 +68,12 @@ public:
       std::span<const Pattern> patterns, int row_step = 1);
   /** Frame of @p pattern, of the camera's size; several frames of the same
    * pattern are averaged. Those of a Gray code and of its inverse come one
-   * after the other: of a pair, only a bit of each pixel is kept. Error for a
-   * pattern of another run, and for a frame that comes too late. */
+   * after the other: of a pair, only a bit of each pixel is kept.
+   * @p bits  significant ones of a pixel; 0: all of its type.
+   * Error for a pattern of another run, and for a frame that comes too late. */
+  template <typename Pixel> // std::uint8_t or std::uint16_t
   Result<void> add (
-      const Pattern &pattern, ImageView<const std::uint8_t> frame);
-  Result<void> add (
-      const Pattern &pattern, ImageView<const std::uint16_t> frame, int bits);
+      const Pattern &pattern, ImageView<const Pixel> frame, int bits = 0);
   /** Patterns without a frame. */
   std::vector<Pattern> missing () const;
 
@@ -104,9 +104,6 @@ private:
   void shrink_gratings (const Pattern &pattern);
   /** Sorted by phase. */
   std::vector<const Slot *> gratings (Axis axis) const;
-  template <typename Pixel>
-  Result<void> add_frame (
-      const Pattern &pattern, ImageView<const Pixel> frame, int largest);
   Result<Image<std::uint8_t>> usable_pixels (CalibrationResult &result) const;
   double gray_difference (Axis axis, const CalibrationResult &result) const;
   Result<CalibrationResult> fit () const;

@@ -85,12 +85,7 @@ CalibrationSession::collect (const Pattern &shown, ImageView<const Pixel> frame)
     ASSIGN_OR_RETURN (calibration_, Calibration::make (options_.camera,
                                         options_.mirrors, options_.patterns));
   }
-  Result<void> added;
-  if constexpr (sizeof (Pixel) == 1)
-    added = calibration_->add (pattern, frame);
-  else
-    added = calibration_->add (
-        pattern, frame, options_.bits > 0 ? options_.bits : 16);
+  const auto added = calibration_->add (pattern, frame, options_.bits);
   if (added)
     collected_++;
   else

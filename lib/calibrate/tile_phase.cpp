@@ -106,9 +106,11 @@ seen_in (const std::vector<Levels> &zones)
   return seen;
 }
 
+} // namespace
+
 template <typename Pixel>
 Result<TilePhase>
-find (ImageView<const Pixel> frame, const Schedule &schedule)
+find_tile_phase (ImageView<const Pixel> frame, const Schedule &schedule)
 {
   if (!schedule.regions ().empty ())
     return Error{schedule.text () +
@@ -155,18 +157,9 @@ find (ImageView<const Pixel> frame, const Schedule &schedule)
   return best;
 }
 
-} // namespace
-
-Result<TilePhase>
-find_tile_phase (ImageView<const std::uint8_t> frame, const Schedule &schedule)
-{
-  return find (frame, schedule);
-}
-
-Result<TilePhase>
-find_tile_phase (ImageView<const std::uint16_t> frame, const Schedule &schedule)
-{
-  return find (frame, schedule);
-}
+template Result<TilePhase> find_tile_phase (
+    ImageView<const std::uint8_t>, const Schedule &);
+template Result<TilePhase> find_tile_phase (
+    ImageView<const std::uint16_t>, const Schedule &);
 
 } // namespace codedexposure

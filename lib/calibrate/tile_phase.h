@@ -35,9 +35,8 @@ struct TilePhase {
  *              get the same light, such as sequential, and for a frame of less
  *              than 8 x 8 periods.
  */
+template <typename Pixel> // std::uint8_t or std::uint16_t
 Result<TilePhase> find_tile_phase (
-    ImageView<const std::uint8_t> frame, const Schedule &schedule);
-Result<TilePhase> find_tile_phase (
-    ImageView<const std::uint16_t> frame, const Schedule &schedule);
+    ImageView<const Pixel> frame, const Schedule &schedule);
 
 } // namespace codedexposure

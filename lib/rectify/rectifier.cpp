@@ -89,16 +89,8 @@ struct Rectifier::Plan {
   Measured measure (ImageView<const Pixel> from, Workers *workers) const;
   rectify::Filters filters_for (int largest, const Measured &roughness) const;
   template <typename Pixel>
-  Result<void> run (ImageView<const Pixel> from, ImageView<Pixel> to,
-      int largest, const std::optional<ImageView<float>> &errors,
-      Workers *workers) const;
-  template <typename Pixel>
   void mark_unknown (
       ImageView<const Pixel> from, ImageView<Pixel> to, Pixel largest) const;
-  template <typename Pixel>
-  Result<void> correct (ImageView<Pixel> mirrors,
-      ImageView<const std::uint16_t> expected, Workers &workers,
-      int largest) const;
 };
 
 namespace
@@ -444,30 +436,32 @@ Rectifier::Plan::filters_for (int largest, const Measured &roughness) const
 
 template <typename Pixel>
 Result<void>
-Rectifier::Plan::run (ImageView<const Pixel> from, ImageView<Pixel> to,
-    int largest, const std::optional<ImageView<float>> &errors,
-    Workers *workers) const
+Rectifier::run (ImageView<const std::type_identity_t<Pixel>> from,
+    ImageView<Pixel> to, int largest,
+    const std::optional<ImageView<float>> &errors, Workers *workers) const
 try {
+  const Plan &plan = *plan_;
   const ViewBytes input = ViewBytes::of (from), output = ViewBytes::of (to);
+  RETURN_IF_ERROR (check_view (
+      input, "camera frame", plan.camera.width, plan.camera.height));
   RETURN_IF_ERROR (
-      check_view (input, "camera frame", camera.width, camera.height));
-  RETURN_IF_ERROR (
-      check_view (output, "output", mirrors.width, mirrors.height));
+      check_view (output, "output", plan.mirrors.width, plan.mirrors.height));
   RETURN_IF_ERROR (check_apart ({&output, 1}, &input));
   if (errors)
-    RETURN_IF_ERROR (check_view (
-        ViewBytes::of (*errors), "errors", mirrors.width, mirrors.height));
+    RETURN_IF_ERROR (check_view (ViewBytes::of (*errors), "errors",
+        plan.mirrors.width, plan.mirrors.height));
   if (largest <= 0)
     largest = std::numeric_limits<Pixel>::max ();
-  const auto roughness = measure (from, workers);
-  const rectify::Filters with = filters_for (largest, roughness);
+  const auto roughness = plan.measure (from, workers);
+  const rectify::Filters with = plan.filters_for (largest, roughness);
   const rectify::Source<Pixel> source{from.row (0), from.stride, from.width};
-  run_parts (workers, mirrors.height, [&] (int y) {
-    run_row<Pixel> () (source, places.view ().row (y), mirrors.width, with,
-        to.row (y), errors ? errors->row (y) : nullptr);
+  run_parts (workers, plan.mirrors.height, [&] (int y) {
+    plan.run_row<Pixel> () (source, plan.places.view ().row (y),
+        plan.mirrors.width, with, to.row (y),
+        errors ? errors->row (y) : nullptr);
   });
-  if (keep_unknown)
-    mark_unknown (from, to, Pixel (largest));
+  if (plan.keep_unknown)
+    plan.mark_unknown (from, to, Pixel (largest));
   return {};
 } catch (const std::bad_alloc &) {
   return out_of_memory ();
@@ -475,36 +469,38 @@ try {
 
 template <typename Pixel>
 Result<void>
-Rectifier::Plan::correct (ImageView<Pixel> to,
+Rectifier::correct (ImageView<Pixel> to,
     ImageView<const std::uint16_t> expected, Workers &workers,
     int largest) const
 try {
-  if (!sight)
+  const Plan &plan = *plan_;
+  if (!plan.sight)
     return Error{"nothing was prepared to correct frames; see corrects ()"};
   RETURN_IF_ERROR (check_view (
-      ViewBytes::of (to), "mirrors", mirrors.width, mirrors.height));
+      ViewBytes::of (to), "mirrors", plan.mirrors.width, plan.mirrors.height));
   RETURN_IF_ERROR (check_view (ViewBytes::of (expected), "expected light",
-      mirrors.width, std::min (expected.height, mirrors.height)));
+      plan.mirrors.width, std::min (expected.height, plan.mirrors.height)));
   if (largest <= 0)
     largest = std::numeric_limits<Pixel>::max ();
   const auto light = rectify::scaled_light<Pixel> (
       expected, ImageView<const Pixel> (to), largest);
-  Image<std::uint16_t> seen (camera.width, camera.height);
-  sight->run (kernels, light.view (), seen.view (), workers);
+  Image<std::uint16_t> seen (plan.camera.width, plan.camera.height);
+  plan.sight->run (plan.kernels, light.view (), seen.view (), workers);
   const ImageView<const std::uint16_t> view = std::as_const (seen).view ();
   const rectify::Source<std::uint16_t> source{
       view.row (0), view.stride, view.width};
-  const auto roughness = measure (view, &workers);
+  const auto roughness = plan.measure (view, &workers);
   const rectify::Filters with =
-      filters_for (int (rectify::kWideWhite), roughness);
-  workers.run (std::max (expected.height - 2 * reach, 0), [&] (int row, int) {
-    const int y = reach + row;
-    std::vector<std::uint16_t> made (std::size_t (mirrors.width));
-    run_row<std::uint16_t> () (source, places.view ().row (y), mirrors.width,
-        with, made.data (), nullptr);
-    rectify::take_off (made.data (), light.view ().row (y), mirrors.width,
-        reach, largest, to.row (y));
-  });
+      plan.filters_for (int (rectify::kWideWhite), roughness);
+  workers.run (
+      std::max (expected.height - 2 * plan.reach, 0), [&] (int row, int) {
+        const int y = plan.reach + row;
+        std::vector<std::uint16_t> made (std::size_t (plan.mirrors.width));
+        plan.run_row<std::uint16_t> () (source, plan.places.view ().row (y),
+            plan.mirrors.width, with, made.data (), nullptr);
+        rectify::take_off (made.data (), light.view ().row (y),
+            plan.mirrors.width, plan.reach, largest, to.row (y));
+      });
   return {};
 } catch (const std::bad_alloc &) {
   return out_of_memory ();
@@ -516,36 +512,13 @@ Rectifier::corrects () const
   return plan_->sight.has_value ();
 }
 
-Result<void>
-Rectifier::correct (ImageView<std::uint8_t> mirrors,
-    ImageView<const std::uint16_t> expected, Workers &workers,
-    int largest) const
-{
-  return plan_->correct (mirrors, expected, workers, largest);
-}
-
-Result<void>
-Rectifier::correct (ImageView<std::uint16_t> mirrors,
-    ImageView<const std::uint16_t> expected, Workers &workers,
-    int largest) const
-{
-  return plan_->correct (mirrors, expected, workers, largest);
-}
-
-Result<void>
-Rectifier::run (ImageView<const std::uint8_t> camera,
-    ImageView<std::uint8_t> mirrors, int largest,
-    const std::optional<ImageView<float>> &errors, Workers *workers) const
-{
-  return plan_->run (camera, mirrors, largest, errors, workers);
-}
-
-Result<void>
-Rectifier::run (ImageView<const std::uint16_t> camera,
-    ImageView<std::uint16_t> mirrors, int largest,
-    const std::optional<ImageView<float>> &errors, Workers *workers) const
-{
-  return plan_->run (camera, mirrors, largest, errors, workers);
-}
+#define INSTANTIATE(Pixel)                                                     \
+  template Result<void> Rectifier::run (ImageView<const Pixel>,                \
+      ImageView<Pixel>, int, const std::optional<ImageView<float>> &,          \
+      Workers *) const;                                                        \
+  template Result<void> Rectifier::correct (                                   \
+      ImageView<Pixel>, ImageView<const std::uint16_t>, Workers &, int) const;
+INSTANTIATE (std::uint8_t)
+INSTANTIATE (std::uint16_t)
 
 } // namespace codedexposure

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <type_traits>
 #include <utility>
 
 #include "base/image.h"
@@ -62,9 +63,9 @@ struct RectifyReport {
  *
  * Weights are made once, for fractions of a pixel; along the borders of
  * regions, where pixels mix two codes, for each mirror. run () is const, can be
- * called from several threads, and keeps four bytes for each pixel of the camera
- * around which weights are used; besides, it allocates a few bytes at most, and
- * with keep_unknown a byte for each row of the camera.
+ * called from several threads, and keeps four bytes for each pixel of the
+ * camera around which weights are used; besides, it allocates a few bytes at
+ * most, and with keep_unknown a byte for each row of the camera.
  */
 class Rectifier
 {
@@ -92,12 +93,9 @@ public:
    *             not depend on it.
    * Error when a view does not have the size of camera () or mirrors (), or the
    * frames overlap. */
-  Result<void> run (ImageView<const std::uint8_t> camera,
-      ImageView<std::uint8_t> mirrors, int largest = 0,
-      const std::optional<ImageView<float>> &errors = {},
-      Workers *workers = nullptr) const;
-  Result<void> run (ImageView<const std::uint16_t> camera,
-      ImageView<std::uint16_t> mirrors, int largest = 0,
+  template <typename Pixel> // std::uint8_t or std::uint16_t
+  Result<void> run (ImageView<const std::type_identity_t<Pixel>> camera,
+      ImageView<Pixel> mirrors, int largest = 0,
       const std::optional<ImageView<float>> &errors = {},
       Workers *workers = nullptr) const;
 
@@ -113,10 +111,8 @@ public:
    *              run ().
    * @p workers   share the rows.
    * Error when nothing is prepared or a view has a wrong size. */
-  Result<void> correct (ImageView<std::uint8_t> mirrors,
-      ImageView<const std::uint16_t> expected, Workers &workers,
-      int largest = 0) const;
-  Result<void> correct (ImageView<std::uint16_t> mirrors,
+  template <typename Pixel>
+  Result<void> correct (ImageView<Pixel> mirrors,
       ImageView<const std::uint16_t> expected, Workers &workers,
       int largest = 0) const;
 

@@ -112,7 +112,7 @@ StatsMeter::fill_histogram ()
 
 template <typename Pixel>
 const PictureStats &
-StatsMeter::measure_pixels (ImageView<const Pixel> picture)
+StatsMeter::measure (ImageView<const Pixel> picture)
 {
   count_levels (picture, levels_);
   summarise ();
@@ -122,9 +122,9 @@ StatsMeter::measure_pixels (ImageView<const Pixel> picture)
   return stats_;
 }
 
-template const PictureStats &StatsMeter::measure_pixels (
+template const PictureStats &StatsMeter::measure (
     ImageView<const std::uint8_t>);
-template const PictureStats &StatsMeter::measure_pixels (
+template const PictureStats &StatsMeter::measure (
     ImageView<const std::uint16_t>);
 
 } // namespace codedexposure

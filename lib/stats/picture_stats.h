@@ -50,19 +50,11 @@ public:
 
   /** @p picture of the size and type that were given. Valid until the next
    * call. */
-  const PictureStats &measure (ImageView<const std::uint8_t> picture)
-  {
-    return measure_pixels (picture);
-  }
-  const PictureStats &measure (ImageView<const std::uint16_t> picture)
-  {
-    return measure_pixels (picture);
-  }
+  template <typename Pixel> // std::uint8_t or std::uint16_t
+  const PictureStats &measure (ImageView<const Pixel> picture);
 
 private:
   StatsMeter () = default;
-  template <typename Pixel>
-  const PictureStats &measure_pixels (ImageView<const Pixel> picture);
   void summarise ();
   void fill_histogram ();
 

@@ -125,7 +125,7 @@ TEST (Stats, MeasureStartsAnewAndHeedsTheStride)
   for (std::uint8_t value : {10, 20}) {
     for (int y = 0; y < 3; y++)
       std::fill_n (picture.row (y), 7, value);
-    const PictureStats &stats = meter->measure (picture);
+    const PictureStats &stats = meter->measure<std::uint8_t> (picture);
     EXPECT_EQ (stats.mean, value);
     EXPECT_EQ (stats.minimum, value);
     EXPECT_EQ (stats.maximum, value);

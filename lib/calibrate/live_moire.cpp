@@ -509,18 +509,10 @@ try {
     return Error{"a frame of " + size_text (camera) +
                  " pixels holds less than " + std::to_string (kMinPeriods) +
                  " periods of the live grating"};
-  return LiveMoire (std::make_unique<State> (expected, options, samples));
+  return LiveMoire (std::make_shared<State> (expected, options, samples));
 } catch (const std::bad_alloc &) {
   return out_of_memory ();
 }
-
-LiveMoire::LiveMoire (std::unique_ptr<State> state) : state_ (std::move (state))
-{
-}
-
-LiveMoire::LiveMoire (LiveMoire &&) noexcept = default;
-LiveMoire &LiveMoire::operator= (LiveMoire &&) noexcept = default;
-LiveMoire::~LiveMoire () = default;
 
 Result<LiveReading>
 LiveMoire::solve (ImageView<const std::uint8_t> frame)

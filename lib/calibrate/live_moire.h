@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <utility>
 
 #include "base/image.h"
 #include "base/result.h"
@@ -52,9 +53,8 @@ public:
    * has less than 8 periods. */
   static Result<LiveMoire> make (
       const Mapping &expected, const LiveMoireOptions &options = {});
-  LiveMoire (LiveMoire &&) noexcept;
-  LiveMoire &operator= (LiveMoire &&) noexcept;
-  ~LiveMoire ();
+  LiveMoire (LiveMoire &&) noexcept = default;
+  LiveMoire &operator= (LiveMoire &&) noexcept = default;
 
   /** @p frame of the expected mapping's camera size. Error when it has another
    * one or shows no grating. */
@@ -66,8 +66,10 @@ public:
 
 private:
   struct State;
-  explicit LiveMoire (std::unique_ptr<State> state);
-  std::unique_ptr<State> state_;
+  explicit LiveMoire (std::shared_ptr<State> state) : state_ (std::move (state))
+  {
+  }
+  std::shared_ptr<State> state_;
 };
 
 } // namespace codedexposure

@@ -81,23 +81,6 @@ PartnerCorrection<Pixel>::State::add_up (int y)
 }
 
 template <typename Pixel>
-PartnerCorrection<Pixel>::PartnerCorrection (std::unique_ptr<State> state)
-    : state_ (std::move (state))
-{
-}
-
-template <typename Pixel>
-PartnerCorrection<Pixel>::PartnerCorrection (
-    PartnerCorrection &&) noexcept = default;
-
-template <typename Pixel>
-PartnerCorrection<Pixel> &PartnerCorrection<Pixel>::operator= (
-    PartnerCorrection &&) noexcept = default;
-
-template <typename Pixel>
-PartnerCorrection<Pixel>::~PartnerCorrection () = default;
-
-template <typename Pixel>
 Result<PartnerCorrection<Pixel>>
 PartnerCorrection<Pixel>::make (const Schedule &schedule,
     const Rectifier &partner, const FuseOptions &options, std::stop_token stop)
@@ -121,7 +104,7 @@ try {
     sums.push_back (slot_sum (map, e, float (65535.0 / (most * largest))));
   const Extent size{
       fuser.slots ().front ().width (), fuser.slots ().front ().height ()};
-  std::unique_ptr<State> state (new State{partner, std::move (fuser),
+  std::shared_ptr<State> state (new State{partner, std::move (fuser),
       std::move (workers), largest, std::move (sums), {size.width, size.height},
       {size.width, size.height}});
   for (int y = 0; y < size.height; y++)

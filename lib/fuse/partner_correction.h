@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <stop_token>
+#include <utility>
 
 #include "base/image.h"
 #include "base/result.h"
@@ -36,9 +37,8 @@ public:
       const Rectifier &partner, const FuseOptions &options,
       std::stop_token stop = {});
 
-  PartnerCorrection (PartnerCorrection &&) noexcept;
-  PartnerCorrection &operator= (PartnerCorrection &&) noexcept;
-  ~PartnerCorrection ();
+  PartnerCorrection (PartnerCorrection &&) noexcept = default;
+  PartnerCorrection &operator= (PartnerCorrection &&) noexcept = default;
 
   /** Both with a pixel a mirror.
    * @p errors  none, or those of the partner, as of Rectifier::run (): less of
@@ -50,8 +50,11 @@ public:
 
 private:
   struct State;
-  explicit PartnerCorrection (std::unique_ptr<State> state);
-  std::unique_ptr<State> state_;
+  explicit PartnerCorrection (std::shared_ptr<State> state)
+      : state_ (std::move (state))
+  {
+  }
+  std::shared_ptr<State> state_;
 };
 
 extern template class PartnerCorrection<std::uint8_t>;

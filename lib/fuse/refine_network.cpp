@@ -5,44 +5,32 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
+#include <cstring>
 
 #include <xxhash.h>
 
+#include "record/json.h"
+
 namespace codedexposure::fuse
 {
+
+static_assert (std::endian::native == std::endian::little);
 
 namespace
 {
 
 constexpr std::uint32_t kMagic = 0x4e584543; // "CEXN"
 
-std::uint32_t
-word_at (const std::byte *from)
+/** The next floats of a file that has enough of them. */
+std::vector<float>
+next_floats (const std::byte *&from, int count)
 {
-  std::uint32_t word = 0;
-  for (int i = 3; i >= 0; i--)
-    word = word << 8 | std::uint32_t (from[i]);
-  return word;
+  auto values = std::vector<float> (std::size_t (count));
+  std::memcpy (values.data (), from, 4 * values.size ());
+  from += 4 * values.size ();
+  return values;
 }
-
-/** Reads the floats of a file that has enough of them. */
-class Reader
-{
-public:
-  explicit Reader (const std::byte *from) : from_ (from) {}
-  std::vector<float> next (int count)
-  {
-    std::vector<float> values;
-    for (; count > 0; count--, from_ += 4)
-      values.push_back (std::bit_cast<float> (word_at (from_)));
-    return values;
-  }
-
-private:
-  const std::byte *from_;
-};
 
 /** The largest scale of an output's weights with which no weight needs more
  * than 16 bits and no sum more than 32, whatever the inputs. */
@@ -121,20 +109,18 @@ RefineNetwork::read (std::span<const std::byte> file)
   for (std::size_t l = 0; l < kLayers; l++)
     words += std::size_t (9 * widths[l] + 1) * std::size_t (widths[l + 1]);
   const std::array<std::uint32_t, 4> head{kMagic, kChannels, kHidden, kPlanes};
-  bool fits = file.size () == 4 * words;
-  for (std::size_t i = 0; fits && i < head.size (); i++)
-    fits = word_at (file.data () + 4 * i) == head[i];
-  if (!fits)
+  if (file.size () != 4 * words ||
+      std::memcmp (file.data (), head.data (), sizeof head) != 0)
     return Error{"weights of " + std::to_string (file.size ()) +
                  " bytes are not those of this network, " +
                  std::to_string (4 * words) +
                  " bytes; write them with tests/quality/train"};
-  Reader reader (file.data () + 4 * head.size ());
+  const std::byte *from = file.data () + sizeof head;
   std::vector<Convolution> convolutions;
   for (std::size_t l = 0; l < kLayers; l++) {
     auto &to = convolutions.emplace_back (widths[l], widths[l + 1]);
-    to.weights = reader.next (9 * to.inputs * to.outputs);
-    to.bias = reader.next (to.outputs);
+    to.weights = next_floats (from, 9 * to.inputs * to.outputs);
+    to.bias = next_floats (from, to.outputs);
   }
   return convolutions;
 }
@@ -175,10 +161,7 @@ RefineNetwork::parse (std::span<const std::byte> file)
     network.layers_.push_back (quantised ((*convolutions)[std::size_t (l)],
         l == 0 ? kInputScale : kHiddenScale,
         l == kLayers - 1 ? 1.0 : kHiddenScale));
-  char hash[17];
-  std::snprintf (hash, sizeof hash, "%016llx",
-      (unsigned long long)XXH3_64bits (file.data (), file.size ()));
-  network.hash_ = hash;
+  network.hash_ = hex_text (XXH3_64bits (file.data (), file.size ()), 16);
   return network;
 }
 

@@ -3,12 +3,25 @@
 #pragma once
 
 #include <algorithm>
-#include <utility>
+#include <stop_token>
 
 #include "base/workers.h"
 
 namespace codedexposure::fuse
 {
+
+/** Who computes a frame, and what can end it early. */
+struct Task {
+  Workers &workers;
+  std::stop_token stop;
+
+  /** Workers::run (). */
+  template <typename Use>
+  bool run (int parts, const Use &use) const
+  {
+    return workers.run (parts, use, stop);
+  }
+};
 
 /** Rows first .. end - 1, and the thread that computes them. */
 struct Band {
@@ -21,19 +34,16 @@ struct Band {
  * bands compute some rows twice. False when it was stopped. */
 template <typename Use>
 bool
-run_bands (Workers &workers, int rows, int min_rows, std::stop_token stop,
-    const Use &use)
+run_bands (const Task &task, int rows, int min_rows, const Use &use)
 {
   constexpr int kForEachThread = 2;
-  const int bands =
-      workers.count () == 1 ? 1 : kForEachThread * workers.count ();
+  const int threads = task.workers.count ();
+  const int bands = threads == 1 ? 1 : kForEachThread * threads;
   const int height = std::max ((rows + bands - 1) / bands, min_rows);
-  return workers.run ((rows + height - 1) / height,
-      [&] (int part, int worker) {
-        const int first = part * height;
-        use (Band{first, std::min (first + height, rows), worker});
-      },
-      std::move (stop));
+  return task.run ((rows + height - 1) / height, [&] (int part, int worker) {
+    const int first = part * height;
+    use (Band{first, std::min (first + height, rows), worker});
+  });
 }
 
 } // namespace codedexposure::fuse

@@ -6,10 +6,10 @@
 namespace codedexposure::fuse
 {
 
-CodedCamera::CodedCamera (const Schedule &schedule,
+CodedCamera::CodedCamera (const Kernels &kernels, const Schedule &schedule,
     const Observation &observation, Extent size, int radius, int period,
     float steps)
-    : radius_ (radius), period_ (period), steps_ (steps),
+    : kernels_ (kernels), radius_ (radius), period_ (period), steps_ (steps),
       pixels_ (size.width, size.height, radius)
 {
   find_margin (schedule, observation.exact ());
@@ -72,29 +72,29 @@ CodedCamera::room () const
 }
 
 void
-CodedCamera::pair (const Kernels &kernels, CodedLight &seen)
+CodedCamera::pair (CodedLight &seen)
 {
   const int width = pixels_.width (), height = pixels_.height ();
   for (int y = 0; y < height; y++)
-    kernels.to_steps (seen.light.row (y), steps_, width, pixels_.row (y));
+    kernels_.to_steps (seen.light.row (y), steps_, width, pixels_.row (y));
   std::int32_t *origin = pixels_.row (0);
   for (const Repeat &repeat : margin_)
     origin[repeat.to] = origin[repeat.from];
   const Parts parts{period_, seen.pairs.stride (), width + 2 * radius_};
   for (int y = -radius_; y < height + radius_; y++) {
     std::int32_t *row = pixels_.row (y) - radius_;
-    kernels.pair (row, parts.count);
-    kernels.split_pairs (parts, row, seen.pairs.row (y));
+    kernels_.pair (row, parts.count);
+    kernels_.split_pairs (parts, row, seen.pairs.row (y));
   }
 }
 
-CodedStream::CodedStream (const Schedule &schedule,
+CodedStream::CodedStream (const Kernels &kernels, const Schedule &schedule,
     const Observation &observation, const Observation *partner, Extent size,
     int radius, int period, float steps)
-    : camera_ (schedule, observation, size, radius, period, steps)
+    : camera_ (kernels, schedule, observation, size, radius, period, steps)
 {
   if (partner)
-    partner_.emplace (schedule, *partner, size, radius, period, steps);
+    partner_.emplace (kernels, schedule, *partner, size, radius, period, steps);
 }
 
 CodedFrame &
@@ -111,11 +111,11 @@ CodedStream::next ()
 }
 
 void
-CodedStream::take (const Kernels &kernels)
+CodedStream::take ()
 {
-  camera_.pair (kernels, spare_);
+  camera_.pair (spare_);
   if (spare_.has_partner)
-    partner_->pair (kernels, spare_.partner);
+    partner_->pair (spare_.partner);
   queue_.push_back (std::exchange (spare_, CodedFrame ()));
 }
 

@@ -53,8 +53,9 @@ class CodedCamera
 public:
   /** @p observation  of the camera, behind the mirrors of @p schedule.
    *  For the others, see CodedStream. */
-  CodedCamera (const Schedule &schedule, const Observation &observation,
-      Extent size, int radius, int period, float steps);
+  CodedCamera (const Kernels &kernels, const Schedule &schedule,
+      const Observation &observation, Extent size, int radius, int period,
+      float steps);
 
   CodedLight room () const;
   /** Factors of the pixels of row @p y, beside 255 / white; null where they are
@@ -64,11 +65,12 @@ public:
     return gain_.empty () ? nullptr : gain_.row (y);
   }
   /** Makes the pairs of what is in the light. */
-  void pair (const Kernels &kernels, CodedLight &seen);
+  void pair (CodedLight &seen);
 
 private:
   void find_margin (const Schedule &schedule, bool exact);
 
+  const Kernels &kernels_;
   int radius_, period_;
   float steps_;
   FieldOf<std::int32_t> pixels_; ///< of one frame, with its margin
@@ -90,9 +92,9 @@ public:
    *  @p radius   of the taps, px.
    *  @p period   of the parts of rows of pairs.
    *  @p steps    see FilterBank. */
-  CodedStream (const Schedule &schedule, const Observation &observation,
-      const Observation *partner, Extent size, int radius, int period,
-      float steps);
+  CodedStream (const Kernels &kernels, const Schedule &schedule,
+      const Observation &observation, const Observation *partner, Extent size,
+      int radius, int period, float steps);
 
   const CodedCamera &camera () const { return camera_; }
   const CodedCamera *partner_camera () const
@@ -103,7 +105,7 @@ public:
    * camera row by row; that of the partner as well, if it has one. */
   CodedFrame &next ();
   /** Queues the frame in next (). */
-  void take (const Kernels &kernels);
+  void take ();
 
   int pending () const { return int (queue_.size ()); }
   /** The oldest pending frame and its neighbours. */

@@ -46,11 +46,11 @@ round_up (int value, int step)
 
 } // namespace
 
-CollaborativeFilter::CollaborativeFilter (const Schedule &schedule,
-    const Observation &observation, const Observation *partner, int width,
-    int height)
-    : observation_ (observation), partner_ (partner), width_ (width),
-      height_ (height),
+CollaborativeFilter::CollaborativeFilter (const Kernels &kernels,
+    const Schedule &schedule, const Observation &observation,
+    const Observation *partner, int width, int height)
+    : kernels_ (kernels), observation_ (observation), partner_ (partner),
+      width_ (width), height_ (height),
       split_ (
           round_up (round_up (width + 2 * kBorder, kBlockStep * Field::kSlack) /
                             kBlockStep +
@@ -100,7 +100,6 @@ CollaborativeFilter::split (const Field &field, std::vector<float> &plane) const
 
 /* Blocks begin at a different pixel in each iteration. */
 struct CollaborativeFilter::Step {
-  const Kernels &kernels;
   int shift_x, shift_y;
   float threshold;
   float length;     ///< as kStep
@@ -125,7 +124,7 @@ CollaborativeFilter::shrink_strip (const Step &step, int strip, float *scratch)
       source[s] = light_[s].data () + start;
       sum[s] = sum_[s].data () + start;
     }
-    step.kernels.shrink ({source.data (), sum.data (), weight_.data () + start,
+    kernels_.shrink ({source.data (), sum.data (), weight_.data () + start,
         stride_, split_, step.shift_x, int (slots), transform_.data (), blocks,
         step.threshold, scratch});
   }
@@ -134,26 +133,21 @@ CollaborativeFilter::shrink_strip (const Step &step, int strip, float *scratch)
 /* Every other strip first, then those between: no two workers add to the same
  * pixel, and each pixel's sum has the same order with any number of them. */
 bool
-CollaborativeFilter::shrink (
-    const Step &step, Workers &workers, std::stop_token stop)
+CollaborativeFilter::shrink (const Step &step, const Task &task)
 {
   const int rows = (height_ + 2 * kBorder - kBlock - step.shift_y) / kBlockStep;
   const int strips = rows / kStripBlocks + 1;
   for (const int odd : {0, 1})
-    if (!workers.run ((strips + 1 - odd) / 2,
-            [&] (int part, int worker) {
-              shrink_strip (
-                  step, 2 * part + odd, scratch_[std::size_t (worker)].data ());
-            },
-            stop))
+    if (!task.run ((strips + 1 - odd) / 2, [&] (int part, int worker) {
+          shrink_strip (
+              step, 2 * part + odd, scratch_[std::size_t (worker)].data ());
+        }))
       return false;
   const int height = height_ + 2 * kBorder;
-  return workers.run ((height + kStripRows - 1) / kStripRows,
-      [&] (int part, int) {
-        update_rows (step, part * kStripRows,
-            std::min (height, (part + 1) * kStripRows));
-      },
-      stop);
+  return task.run ((height + kStripRows - 1) / kStripRows, [&] (int part, int) {
+    update_rows (
+        step, part * kStripRows, std::min (height, (part + 1) * kStripRows));
+  });
 }
 
 /* The light of rows @first .. @end - 1 from the sums, which are cleared, such
@@ -167,7 +161,7 @@ CollaborativeFilter::update_rows (const Step &step, int first, int end)
     sum.push_back (sum_[s].data () + first * stride_);
   }
   const auto at = first * stride_;
-  step.kernels.settle ({light.data (), sum.data (), weight_.data () + at,
+  kernels_.settle ({light.data (), sum.data (), weight_.data () + at,
       coded_.data () + at, measured_.data () + at, int (light_.size ()),
       int ((end - first) * stride_), step.length});
   if (!observation_.exact ())
@@ -197,11 +191,10 @@ CollaborativeFilter::correct_rows (int first, int end,
 }
 
 bool
-CollaborativeFilter::run (const Kernels &kernels, const Field &coded,
-    const Field *partner, double noise, std::span<Field> slots,
-    Workers &workers, std::stop_token stop)
+CollaborativeFilter::run (const Field &coded, const Field *partner,
+    double noise, std::span<Field> slots, const Task &task)
 {
-  scratch_.resize (std::size_t (workers.count ()));
+  scratch_.resize (std::size_t (task.workers.count ()));
   for (auto &scratch : scratch_)
     scratch.resize (slots.size () * kBlock * kBlock * Field::kSlack);
   split (coded, coded_);
@@ -228,11 +221,11 @@ CollaborativeFilter::run (const Kernels &kernels, const Field &coded,
     const double threshold =
         first * std::pow (last / first,
                     std::pow (double (i) / (kIterations - 1), kSlowing));
-    if (!shrink ({kernels, (i / 2 + 2 * i) % kBlockStep, i % kBlockStep,
-                     float (threshold),
-                     i < kIterations - kLastIterations ? kStep : 1.0f,
-                     towards_partner (threshold)},
-            workers, stop))
+    if (!shrink (
+            {(i / 2 + 2 * i) % kBlockStep, i % kBlockStep, float (threshold),
+                i < kIterations - kLastIterations ? kStep : 1.0f,
+                towards_partner (threshold)},
+            task))
       return false;
   }
   for (std::size_t s = 0; s < slots.size (); s++) {

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "base/workers.h"
 #include "estimate/observation.h"
+#include "fuse/bands.h"
 #include "fuse/field.h"
 #include "fuse/kernels.h"
 
@@ -25,17 +25,17 @@ class CollaborativeFilter
 public:
   /** @p partner  of a second camera; null: there is none. It and @p observation
    *              outlive this. */
-  CollaborativeFilter (const Schedule &schedule, const Observation &observation,
-      const Observation *partner, int width, int height);
+  CollaborativeFilter (const Kernels &kernels, const Schedule &schedule,
+      const Observation &observation, const Observation *partner, int width,
+      int height);
 
   /** Improves @p slots, an estimate of the light of each slot, by @p coded. The
    * result does not depend on the number of workers.
    * @p partner  null, or what the slots are to make in the partner.
    * @p noise    standard deviation of the coded pixels' noise, grey levels.
    * @return     false when it was stopped. */
-  bool run (const Kernels &kernels, const Field &coded, const Field *partner,
-      double noise, std::span<Field> slots, Workers &workers,
-      std::stop_token stop);
+  bool run (const Field &coded, const Field *partner, double noise,
+      std::span<Field> slots, const Task &task);
 
 private:
   /* Planes are split into every kBlockStep-th column, as the kernels expect,
@@ -43,12 +43,13 @@ private:
   std::size_t place (int x, int y) const;
   void split (const Field &field, std::vector<float> &plane) const;
   struct Step;
-  bool shrink (const Step &step, Workers &workers, std::stop_token stop);
+  bool shrink (const Step &step, const Task &task);
   void shrink_strip (const Step &step, int strip, float *scratch);
   void update_rows (const Step &step, int first, int end);
   void correct_rows (int first, int end, const Observation &observation,
       const std::vector<float> &seen, float part);
 
+  const Kernels &kernels_;
   const Observation &observation_;
   const Observation *partner_;
   int width_, height_;

@@ -184,16 +184,16 @@ Engine::Engine (const Schedule &schedule, const Schedule *partner, Extent size,
   /* Only `balanced` and above follow motion into other coded frames. */
   sources_.emplace (SplitField (size.width, 0, radius, period),
       quality_ == FuseQuality::kFast ? int (kNeighbourRadius) : radius);
-  plan_.emplace (FilterPlan{phases_, observation_, *sources_,
+  plan_.emplace (FilterPlan{kernels_, phases_, observation_, *sources_,
       relative_noise (observation_), of_partner,
       of_partner ? relative_noise (*of_partner) : std::vector<double> (),
       radius, pixel_steps, options.lookahead > 0, std::move (stop)});
-  stream_.emplace (
-      schedule, observation_, of_partner, size, radius, period, pixel_steps);
+  stream_.emplace (kernels_, schedule, observation_, of_partner, size, radius,
+      period, pixel_steps);
   static_pixels_.emplace (
-      noise_, size, around, !observation_.noise_free (), largest);
+      kernels_, noise_, size, around, !observation_.noise_free (), largest);
   if (partner)
-    partner_fit_.emplace (schedule, *partner_, size);
+    partner_fit_.emplace (kernels_, schedule, *partner_, size);
   Models models;
   if (quality_ == FuseQuality::kFast) {
     models = fast_models (slots ());
@@ -207,7 +207,7 @@ Engine::Engine (const Schedule &schedule, const Schedule *partner, Extent size,
   predictions_.emplace (*plan_, models, size, around);
   if (quality_ == FuseQuality::kBest) {
     collaborative_.emplace (
-        schedule, observation_, of_partner, size.width, size.height);
+        kernels_, schedule, observation_, of_partner, size.width, size.height);
     if (partner)
       made_in_partner_ = Field (size.width, size.height);
   }
@@ -218,8 +218,8 @@ Engine::Engine (const Schedule &schedule, const Schedule *partner, Extent size,
                   ": the refinement was trained for light up to white"
             : Refiner::why_not (schedule, observation_, typical_noise ());
   if (options.refine && unrefined_.empty ())
-    refiner_.emplace (
-        schedule, observation_, size.width, size.height, typical_noise ());
+    refiner_.emplace (kernels_, schedule, observation_, size.width, size.height,
+        typical_noise ());
 }
 
 /* Static pixels are the same in every slot. */
@@ -235,7 +235,7 @@ Engine::blend_static (const StaticPixels::Found &still)
         to[x] += slot.row (y)[x] / float (slots ());
   }
   if (smooth)
-    static_pixels_->smooth (kernels_, still, static_light_);
+    static_pixels_->smooth (still, static_light_);
   for (Field &slot : light_)
     for (int y = 0; y < size_.height; y++) {
       const float *weight = still.weight.row (y);
@@ -248,8 +248,8 @@ Engine::blend_static (const StaticPixels::Found &still)
 
 /* Whole frames, for the stages that look around. */
 bool
-Engine::fill_light (const CodedFrames &frames, const Seen &seen,
-    Workers &workers, std::stop_token stop)
+Engine::fill_light (
+    const CodedFrames &frames, const Seen &seen, const Task &task)
 {
   if (light_.empty ())
     light_.assign (std::size_t (slots ()), Field (size_.width, size_.height));
@@ -258,47 +258,44 @@ Engine::fill_light (const CodedFrames &frames, const Seen &seen,
       std::copy_n (rows[s], size_.width, light_[s].row (y));
   };
   if (linear_)
-    return linear_->run (
-        kernels_, frames, seen.predicted, seen.still, keep, workers, stop);
-  if (!motion_->run (kernels_, frames, light_, misfit_, workers, stop))
+    return linear_->run (frames, seen.predicted, seen.still, keep, task);
+  if (!motion_->run (frames, light_, misfit_, task))
     return false;
   if (collaborative_) {
-    if (!fit_partner (frames, workers, stop, &made_in_partner_))
+    if (!fit_partner (frames, task, &made_in_partner_))
       return false;
-    if (!collaborative_->run (kernels_, frames.now->light,
+    if (!collaborative_->run (frames.now->light,
             frames.has_partner () ? &made_in_partner_ : nullptr,
-            typical_noise (), light_, workers, stop))
+            typical_noise (), light_, task))
       return false;
   }
   blend_static (seen.still);
-  return fit_partner (frames, workers, stop);
+  return fit_partner (frames, task);
 }
 
 /* What the network makes does not add up to what the partner saw. */
 bool
 Engine::fill (const CodedFrames &frames, const Seen &seen, bool deviations,
-    Workers &workers, std::stop_token stop)
+    const Task &task)
 {
-  if (!fill_light (frames, seen, workers, stop))
+  if (!fill_light (frames, seen, task))
     return false;
-  return !refiner_ ||
-         (refiner_->run (kernels_, frames, seen.still.weight, light_,
-              deviations ? &deviations_ : nullptr, workers, stop) &&
-             fit_partner (frames, workers, stop));
+  return !refiner_ || (refiner_->run (frames, seen.still.weight, light_,
+                           deviations ? &deviations_ : nullptr, task) &&
+                          fit_partner (frames, task));
 }
 
 /* Where the partner is not known, the first camera is all that there is. */
 bool
 Engine::fill_clipped (const CodedFrames &frames, const Seen &seen,
-    bool deviations, Workers &workers, std::stop_token stop)
+    bool deviations, const Task &task)
 {
-  if (!fill (frames.of_first (), seen, deviations, workers, stop))
+  if (!fill (frames.of_first (), seen, deviations, task))
     return false;
   std::swap (light_, alone_);
   std::swap (deviations_, alone_deviations_);
-  const auto *predicted = predictions_->run (kernels_, frames, workers, stop);
-  if (!predicted ||
-      !fill (frames, {*predicted, seen.still}, deviations, workers, stop))
+  const auto *predicted = predictions_->run (frames, task);
+  if (!predicted || !fill (frames, {*predicted, seen.still}, deviations, task))
     return false;
   const auto restore = [&] (std::vector<Field> &to,
                            const std::vector<Field> &from) {
@@ -317,37 +314,34 @@ Engine::fill_clipped (const CodedFrames &frames, const Seen &seen,
 }
 
 bool
-Engine::fit_partner (const CodedFrames &frames, Workers &workers,
-    std::stop_token stop, Field *made)
+Engine::fit_partner (const CodedFrames &frames, const Task &task, Field *made)
 {
   if (!frames.has_partner ())
     return true;
   constexpr int kMinRows = 16;
-  return run_bands (workers, size_.height, kMinRows, std::move (stop),
-      [&] (const Band &band) {
-        PartnerFit::Room room (*partner_fit_);
-        std::vector<float *> rows (light_.size ());
-        for (int y = band.first; y < band.end; y++) {
-          for (std::size_t s = 0; s < rows.size (); s++)
-            rows[s] = light_[s].row (y);
-          partner_fit_->run (kernels_, y, frames.now->partner.light.row (y),
-              rows.data (), room);
-          if (made)
-            partner_fit_->make (y, rows.data (), made->row (y));
-        }
-      });
+  return run_bands (task, size_.height, kMinRows, [&] (const Band &band) {
+    PartnerFit::Room room (*partner_fit_);
+    std::vector<float *> rows (light_.size ());
+    for (int y = band.first; y < band.end; y++) {
+      for (std::size_t s = 0; s < rows.size (); s++)
+        rows[s] = light_[s].row (y);
+      partner_fit_->run (
+          y, frames.now->partner.light.row (y), rows.data (), room);
+      if (made)
+        partner_fit_->make (y, rows.data (), made->row (y));
+    }
+  });
 }
 
 std::optional<Engine::Seen>
-Engine::look (const CodedFrames &frames, Workers &workers, std::stop_token stop)
+Engine::look (const CodedFrames &frames, const Task &task)
 {
-  plan_->stop = stop;
-  const auto *predicted = predictions_->run (
-      kernels_, frames.clipped () ? frames.of_first () : frames, workers, stop);
+  plan_->stop = task.stop;
+  const auto *predicted =
+      predictions_->run (frames.clipped () ? frames.of_first () : frames, task);
   if (!predicted)
     return {};
-  const auto still = static_pixels_->take (
-      kernels_, frames, predicted->unrepeated, workers, stop);
+  const auto still = static_pixels_->take (frames, predicted->unrepeated, task);
   if (!still)
     return {};
   return Seen{*predicted, *still};
@@ -355,18 +349,17 @@ Engine::look (const CodedFrames &frames, Workers &workers, std::stop_token stop)
 
 bool
 Engine::fuse_frame (const CodedFrames &frames, const RowSink &sink,
-    Workers &workers, std::stop_token stop, const Uncertainty::Sink &deviations)
+    const Task &task, const Uncertainty::Sink &deviations)
 {
-  const auto seen = look (frames, workers, stop);
+  const auto seen = look (frames, task);
   if (!seen)
     return false;
   const bool clipped = frames.clipped ();
   if (linear_ && !refiner_ && !deviations && !clipped)
-    return linear_->run (
-        kernels_, frames, seen->predicted, seen->still, sink, workers, stop);
+    return linear_->run (frames, seen->predicted, seen->still, sink, task);
   const bool wanted = bool (deviations);
-  if (clipped ? !fill_clipped (frames, *seen, wanted, workers, stop)
-              : !fill (frames, *seen, wanted, workers, stop))
+  if (clipped ? !fill_clipped (frames, *seen, wanted, task)
+              : !fill (frames, *seen, wanted, task))
     return false;
   std::vector<const float *> rows (light_.size ());
   for (int y = 0; y < size_.height; y++) {
@@ -379,18 +372,17 @@ Engine::fuse_frame (const CodedFrames &frames, const RowSink &sink,
   if (!uncertainty_)
     uncertainty_.emplace (schedule_, *plan_, quality_, size_, depth_);
   const Field &misfit = motion_ ? misfit_ : seen->predicted.misfit;
-  return uncertainty_->run (kernels_,
+  return uncertainty_->run (
       {frames, partner_fit_ ? &*partner_fit_ : nullptr, noise_, seen->still,
           misfit, light_, refiner_ ? &deviations_ : nullptr},
-      deviations, workers, stop);
+      deviations, task);
 }
 
 bool
-Engine::fuse (const RowSink &sink, Workers &workers, std::stop_token stop,
-    const Uncertainty::Sink &deviations)
+Engine::fuse (
+    const RowSink &sink, const Task &task, const Uncertainty::Sink &deviations)
 {
-  const bool done =
-      fuse_frame (stream_->frames (), sink, workers, stop, deviations);
+  const bool done = fuse_frame (stream_->frames (), sink, task, deviations);
   stream_->advance ();
   return done;
 }
@@ -398,7 +390,7 @@ Engine::fuse (const RowSink &sink, Workers &workers, std::stop_token stop,
 void
 Engine::pass (Workers &workers)
 {
-  look (stream_->frames (), workers, {});
+  look (stream_->frames (), {workers, {}});
   stream_->advance ();
 }
 

@@ -45,7 +45,7 @@ public:
    * @p deviations  gets the half-width of the 68 % interval of each pixel, if
    *                 it is set.
    * False, or Stopped, when it was stopped; forget () is to be called then. */
-  bool fuse (const RowSink &sink, Workers &workers, std::stop_token stop,
+  bool fuse (const RowSink &sink, const Task &task,
       const Uncertainty::Sink &deviations = {});
   /** Takes the oldest frame away, after what those behind it need to know of
    * it. */
@@ -62,23 +62,21 @@ private:
   };
   /** Of a frame whose partner does not tell of all pixels, what the first
    * camera alone tells. Nothing when it was stopped. */
-  std::optional<Seen> look (
-      const CodedFrames &frames, Workers &workers, std::stop_token stop);
+  std::optional<Seen> look (const CodedFrames &frames, const Task &task);
   bool fuse_frame (const CodedFrames &frames, const RowSink &sink,
-      Workers &workers, std::stop_token stop,
-      const Uncertainty::Sink &deviations);
-  bool fill_light (const CodedFrames &frames, const Seen &seen,
-      Workers &workers, std::stop_token stop);
+      const Task &task, const Uncertainty::Sink &deviations);
+  bool fill_light (
+      const CodedFrames &frames, const Seen &seen, const Task &task);
   /** Light, refined if it is to be. @p deviations  whether they are wanted. */
   bool fill (const CodedFrames &frames, const Seen &seen, bool deviations,
-      Workers &workers, std::stop_token stop);
+      const Task &task);
   bool fill_clipped (const CodedFrames &frames, const Seen &seen,
-      bool deviations, Workers &workers, std::stop_token stop);
+      bool deviations, const Task &task);
   /** PartnerFit of light_; @p made, if set, gets what that makes in the
    * partner.
    */
-  bool fit_partner (const CodedFrames &frames, Workers &workers,
-      std::stop_token stop, Field *made = nullptr);
+  bool fit_partner (
+      const CodedFrames &frames, const Task &task, Field *made = nullptr);
   void blend_static (const StaticPixels::Found &still);
   /** Standard deviation of coded pixels in grey levels. */
   double typical_noise () const;

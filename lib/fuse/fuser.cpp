@@ -311,7 +311,7 @@ Fuser<Pixel>::State::take (ImageView<const Pixel> coded,
           frame.partner.light.row (at.y)[at.x] =
               frame.partner.light.row (from.y)[from.x];
       }
-    stream.take (piece.engine->kernels ());
+    stream.take ();
   }
   return {};
 }
@@ -348,6 +348,7 @@ Fuser<Pixel>::State::fuse (std::span<const ImageView<Pixel>> frames,
     std::stop_token stop, std::span<const ImageView<std::uint16_t>> uncertainty)
 {
   const float scale = largest / (kWhite * float (range));
+  const fuse::Task task{*workers, std::move (stop)};
   bool done = true;
   for (Piece &piece : pieces) {
     const auto &[left, top, width, height] = piece.rect;
@@ -387,9 +388,9 @@ Fuser<Pixel>::State::fuse (std::span<const ImageView<Pixel>> frames,
                 width, uncertainty[k].row (top + row.y) + left);
         };
     if (piece.overlap)
-      done &= piece.overlap->run (piece.engine->stream ().frames (),
-          !uncertainty.empty (), *workers, stop);
-    done = done && piece.engine->fuse (write, *workers, stop,
+      done &= piece.overlap->run (
+          piece.engine->stream ().frames (), !uncertainty.empty (), task);
+    done = done && piece.engine->fuse (write, task,
                        uncertainty.empty () ? fuse::Uncertainty::Sink ()
                                             : write_deviation);
   }

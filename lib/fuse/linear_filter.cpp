@@ -88,9 +88,8 @@ struct LinearFilter::Room {
 };
 
 void
-LinearFilter::share (const Kernels &kernels,
-    const Predictions::Found &predicted, const StaticPixels::Found &still,
-    int y, Room &to) const
+LinearFilter::share (const Predictions::Found &predicted,
+    const StaticPixels::Found &still, int y, Room &to) const
 {
   std::vector<const float *> preferences;
   for (const Field &preference : predicted.preferences)
@@ -99,18 +98,18 @@ LinearFilter::share (const Kernels &kernels,
   std::vector<float *> shares;
   for (int model = 0; model < to.shares.height (); model++)
     shares.push_back (to.shares.row (model));
-  kernels.share (
+  plan_.kernels.share (
       {still.weight.row (y), still.light.row (y),
           preferences.empty () ? nullptr : preferences.data (),
           int (shares.size ()), kRunBlock * to.parts.period, to.parts.count},
       to.still.row (0), shares.data (), to.kept.data ());
   for (int model = 0; model < to.shares.height (); model++)
-    kernels.split (to.parts, to.shares.row (model), to.split.row (model));
+    plan_.kernels.split (to.parts, to.shares.row (model), to.split.row (model));
 }
 
 void
-LinearFilter::estimate (const Kernels &kernels, const Banks &filters,
-    const CodedFrames &frames, int y, Room &to) const
+LinearFilter::estimate (
+    const Banks &filters, const CodedFrames &frames, int y, Room &to) const
 {
   const int slots = to.light.height ();
   const auto sources = plan_.sources.row (frames, y, to.sources);
@@ -123,30 +122,30 @@ LinearFilter::estimate (const Kernels &kernels, const Banks &filters,
       const auto at = column * to.parts.stride;
       for (int s = 0; s < slots; s++) {
         float *light = to.light.row (s) + at;
-        kernels.filter_add (
+        plan_.kernels.filter_add (
             filters[model].row (phases[column], column, s, sources, to.runs),
             to.split.row (int (model)) + at, &light);
       }
     }
   }
   for (int s = 0; s < slots; s++)
-    kernels.join (
+    plan_.kernels.join (
         to.parts, to.light.row (s), to.still.row (0), to.rows.row (s));
 }
 
 bool
-LinearFilter::run (const Kernels &kernels, const CodedFrames &frames,
+LinearFilter::run (const CodedFrames &frames,
     const Predictions::Found &predicted, const StaticPixels::Found &still,
-    const RowSink &sink, Workers &workers, std::stop_token stop)
+    const RowSink &sink, const Task &task)
 {
   const Neighbours used = models_.used (frames.neighbours ());
   const Banks &filters =
       filters_.get (used, [&] { return make_filters (used); });
   const int slots = plan_.observation.slots ();
   const int height = still.weight.height ();
-  std::vector<std::optional<Room>> rooms (std::size_t (workers.count ()));
-  return workers.run ((height + kBandRows - 1) / kBandRows,
-      [&] (int part, int worker) {
+  std::vector<std::optional<Room>> rooms (std::size_t (task.workers.count ()));
+  return task.run (
+      (height + kBandRows - 1) / kBandRows, [&] (int part, int worker) {
         auto &room = rooms[std::size_t (worker)];
         if (!room)
           room.emplace (plan_.sources.width (), plan_.sources.period (),
@@ -158,15 +157,14 @@ LinearFilter::run (const Kernels &kernels, const CodedFrames &frames,
           rows.push_back (room->rows.row (s));
         const int end = std::min ((part + 1) * kBandRows, height);
         for (int y = part * kBandRows; y < end; y++) {
-          share (kernels, predicted, still, y, *room);
-          estimate (kernels, filters, frames, y, *room);
+          share (predicted, still, y, *room);
+          estimate (filters, frames, y, *room);
           if (frames.has_partner ())
-            fit_->run (kernels, y, frames.now->partner.light.row (y),
-                rows.data (), *room->of_fit);
+            fit_->run (y, frames.now->partner.light.row (y), rows.data (),
+                *room->of_fit);
           sink (y, rows.data ());
         }
-      },
-      std::move (stop));
+      });
 }
 
 } // namespace codedexposure::fuse

@@ -5,7 +5,7 @@
 #include <functional>
 #include <vector>
 
-#include "base/workers.h"
+#include "fuse/bands.h"
 #include "fuse/models.h"
 #include "fuse/partner_fit.h"
 #include "fuse/predictions.h"
@@ -29,9 +29,8 @@ public:
       const FilterPlan &plan, const Models &models, const PartnerFit *fit);
 
   /** False when it was stopped. */
-  bool run (const Kernels &kernels, const CodedFrames &frames,
-      const Predictions::Found &predicted, const StaticPixels::Found &still,
-      const RowSink &sink, Workers &workers, std::stop_token stop);
+  bool run (const CodedFrames &frames, const Predictions::Found &predicted,
+      const StaticPixels::Found &still, const RowSink &sink, const Task &task);
 
 private:
   using Banks = std::vector<FilterBank>; ///< of each model; groups are slots
@@ -39,10 +38,10 @@ private:
   Banks make_filters (Neighbours neighbours) const;
   /** Of a thread. */
   struct Room;
-  void share (const Kernels &kernels, const Predictions::Found &predicted,
+  void share (const Predictions::Found &predicted,
       const StaticPixels::Found &still, int y, Room &to) const;
-  void estimate (const Kernels &kernels, const Banks &filters,
-      const CodedFrames &frames, int y, Room &to) const;
+  void estimate (
+      const Banks &filters, const CodedFrames &frames, int y, Room &to) const;
 
   const FilterPlan &plan_;
   Models models_;

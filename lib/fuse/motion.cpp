@@ -246,8 +246,8 @@ MotionFilter::sets_for (Neighbours neighbours)
 
 /* The squared residuals of a chunk of classes in row @y of pixels. */
 void
-MotionFilter::measure_row (const Kernels &kernels, const CodedFrames &frames,
-    const Set &set, int group, int y, float *const *to, Room &room) const
+MotionFilter::measure_row (const CodedFrames &frames, const Set &set, int group,
+    int y, float *const *to, Room &room) const
 {
   const int period = plan_.sources.period ();
   const auto sources = plan_.sources.row (frames, y, room.sources[0]);
@@ -265,17 +265,17 @@ MotionFilter::measure_row (const Kernels &kernels, const CodedFrames &frames,
       outputs = row.outputs;
       for (int k = 0; k < outputs; k++)
         parts[std::size_t (k)] = room.parts.row (k) + column * room.part;
-      kernels.filter_squared (row, parts.data ());
+      plan_.kernels.filter_squared (row, parts.data ());
     }
   for (int k = 0; k < outputs; k++)
-    kernels.join ({period, room.part, frames.now->light.width ()},
+    plan_.kernels.join ({period, room.part, frames.now->light.width ()},
         room.parts.row (k), nullptr, to[k]);
 }
 
 /* The same in all blocks of the room's rows and around them. */
 void
-MotionFilter::measure_blocks (const Kernels &kernels, const CodedFrames &frames,
-    const Set &set, int group, Room &room) const
+MotionFilter::measure_blocks (
+    const CodedFrames &frames, const Set &set, int group, Room &room) const
 {
   const int width = frames.now->light.width ();
   const int height = frames.now->light.height ();
@@ -284,7 +284,7 @@ MotionFilter::measure_blocks (const Kernels &kernels, const CodedFrames &frames,
     for (std::size_t i = 0; i < 2 * kChunk; i++)
       to[i] = room.squares.row (int (i));
     for (const int half : {0, 1})
-      measure_row (kernels, frames, set, group,
+      measure_row (frames, set, group,
           mirrored (2 * (room.first + y) + half, height),
           to.data () + (half ? kChunk : 0), room);
     for (std::size_t i = 0; i < kChunk; i++) {
@@ -293,7 +293,7 @@ MotionFilter::measure_blocks (const Kernels &kernels, const CodedFrames &frames,
           square[-x] = square[mirrored (-x, width)];
           square[width - 1 + x] = square[mirrored (width - 1 + x, width)];
         }
-      kernels.sum_blocks (to[i] - 2 * kReach, to[i + kChunk] - 2 * kReach,
+      plan_.kernels.sum_blocks (to[i] - 2 * kReach, to[i + kChunk] - 2 * kReach,
           room.blocks + 2 * kReach, room.sums[i].row (y) - kReach);
     }
   }
@@ -302,17 +302,18 @@ MotionFilter::measure_blocks (const Kernels &kernels, const CodedFrames &frames,
 /* The squared error of the classes of @set around each block of the room, whose
  * classes of the frame come first. */
 void
-MotionFilter::measure (const Kernels &kernels, const CodedFrames &frames,
-    const Set &set, std::size_t first, Room &room) const
+MotionFilter::measure (const CodedFrames &frames, const Set &set,
+    std::size_t first, Room &room) const
 {
   for (std::size_t c = 0; c < set.factors.size (); c++) {
     if (c % kChunk == 0)
-      measure_blocks (kernels, frames, set, int (c / kChunk), room);
+      measure_blocks (frames, set, int (c / kChunk), room);
     const Field &sums = room.sums[c % kChunk];
     for (int y = -kReach; y < room.rows + kReach; y++)
-      blur (kernels, sums.row (y), 1, room.blocks, room.along.row (y + kReach));
+      blur (plan_.kernels, sums.row (y), 1, room.blocks,
+          room.along.row (y + kReach));
     for (int y = 0; y < room.rows; y++)
-      blur (kernels, room.along.row (y + kReach), room.along.stride (),
+      blur (plan_.kernels, room.along.row (y + kReach), room.along.stride (),
           room.blocks, room.fit (first + c, y));
   }
   for (std::size_t c = 0; c < set.followed.size (); c++)
@@ -329,24 +330,22 @@ MotionFilter::measure (const Kernels &kernels, const CodedFrames &frames,
  * and a mean of several filters is truer than the one that happens to fit best.
  */
 void
-MotionFilter::set_weights (
-    const Kernels &kernels, Room &room, Field &misfit) const
+MotionFilter::set_weights (Room &room, Field &misfit) const
 {
   std::vector<float *> fit (room.factors.size ());
   for (int y = 0; y < room.rows; y++) {
     for (std::size_t c = 0; c < fit.size (); c++)
       fit[c] = room.fit (c, y);
-    kernels.weigh ({fit.data (), room.factors.data (), int (fit.size ()),
-                       kErrorFloor, kMinWeight, room.blocks},
+    plan_.kernels.weigh ({fit.data (), room.factors.data (), int (fit.size ()),
+                             kErrorFloor, kMinWeight, room.blocks},
         misfit.row (room.first + y));
   }
 }
 
 /* The sum of all classes by their weights, for row @y of the room's blocks. */
 void
-MotionFilter::mix (const Kernels &kernels, const CodedFrames &frames,
-    std::span<const Set *const> sets, int y, std::span<Field> slots,
-    Room &room) const
+MotionFilter::mix (const CodedFrames &frames, std::span<const Set *const> sets,
+    int y, std::span<Field> slots, Room &room) const
 {
   const int period = plan_.sources.period (), n = int (slots.size ());
   const int width = slots[0].width ();
@@ -364,7 +363,7 @@ MotionFilter::mix (const Kernels &kernels, const CodedFrames &frames,
   std::size_t c = 0;
   for (const Set *set : sets)
     for (int of_set = 0; of_set < set->filters.groups (); of_set++, c++) {
-      kernels.split (of_shares, room.fit (c, y), room.shares.row (0));
+      plan_.kernels.split (of_shares, room.fit (c, y), room.shares.row (0));
       for (int column = 0; column < period; column++) {
         const float *share =
             room.shares.row (0) + column / 2 * std::ptrdiff_t (room.part);
@@ -376,7 +375,7 @@ MotionFilter::mix (const Kernels &kernels, const CodedFrames &frames,
           for (int s = 0; s < n; s++)
             to[std::size_t (s)] = room.parts.row ((row - first) * n + s) +
                                   column * std::ptrdiff_t (room.part);
-          kernels.filter_add (
+          plan_.kernels.filter_add (
               set->filters.row (phases[row - first][column], column, of_set,
                   room.sources[row - first], room.runs),
               share, to.data ());
@@ -385,24 +384,23 @@ MotionFilter::mix (const Kernels &kernels, const CodedFrames &frames,
     }
   for (int row = first; row < end; row++)
     for (int s = 0; s < n; s++)
-      kernels.join ({period, room.part, width},
+      plan_.kernels.join ({period, room.part, width},
           room.parts.row ((row - first) * n + s), nullptr,
           slots[std::size_t (s)].row (row));
 }
 
 bool
-MotionFilter::run (const Kernels &kernels, const CodedFrames &frames,
-    std::span<Field> slots, Field &misfit, Workers &workers,
-    std::stop_token stop)
+MotionFilter::run (const CodedFrames &frames, std::span<Field> slots,
+    Field &misfit, const Task &task)
 {
   const std::vector<const Set *> sets = sets_for (frames.neighbours ());
   std::vector<float> factors;
   for (const Set *set : sets)
     std::ranges::copy (set->factors, std::back_inserter (factors));
-  std::vector<std::optional<Room>> rooms (std::size_t (workers.count ()));
+  std::vector<std::optional<Room>> rooms (std::size_t (task.workers.count ()));
   const int rows = misfit.height ();
-  return workers.run ((rows + kBandRows - 1) / kBandRows,
-      [&] (int part, int worker) {
+  return task.run (
+      (rows + kBandRows - 1) / kBandRows, [&] (int part, int worker) {
         auto &room = rooms[std::size_t (worker)];
         if (!room)
           room.emplace (slots[0].width (), plan_.sources.period (),
@@ -411,14 +409,13 @@ MotionFilter::run (const Kernels &kernels, const CodedFrames &frames,
         room->rows = std::min (kBandRows, rows - room->first);
         std::size_t first = 0;
         for (const Set *set : sets) {
-          measure (kernels, frames, *set, first, *room);
+          measure (frames, *set, first, *room);
           first += set->factors.size ();
         }
-        set_weights (kernels, *room, misfit);
+        set_weights (*room, misfit);
         for (int y = 0; y < room->rows; y++)
-          mix (kernels, frames, sets, y, slots, *room);
-      },
-      std::move (stop));
+          mix (frames, sets, y, slots, *room);
+      });
 }
 
 } // namespace codedexposure::fuse

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "base/workers.h"
+#include "fuse/bands.h"
 #include "fuse/filter_bank.h"
 #include "fuse/models.h"
 
@@ -37,9 +37,8 @@ public:
    * @p misfit  gets the mean squared error around each block of 2x2 pixels of
    *            the class that fits best there, in grey levels squared.
    * @return  false when it was stopped. */
-  bool run (const Kernels &kernels, const CodedFrames &frames,
-      std::span<Field> slots, Field &misfit, Workers &workers,
-      std::stop_token stop);
+  bool run (const CodedFrames &frames, std::span<Field> slots, Field &misfit,
+      const Task &task);
 
 private:
   /** Classes with the same taps. */
@@ -60,16 +59,15 @@ private:
   std::vector<const Set *> sets_for (Neighbours neighbours);
 
   struct Room;
-  void measure_row (const Kernels &kernels, const CodedFrames &frames,
-      const Set &set, int group, int y, float *const *to, Room &room) const;
-  void measure_blocks (const Kernels &kernels, const CodedFrames &frames,
-      const Set &set, int group, Room &room) const;
-  void measure (const Kernels &kernels, const CodedFrames &frames,
-      const Set &set, std::size_t first, Room &room) const;
-  void set_weights (const Kernels &kernels, Room &room, Field &misfit) const;
-  void mix (const Kernels &kernels, const CodedFrames &frames,
-      std::span<const Set *const> sets, int y, std::span<Field> slots,
+  void measure_row (const CodedFrames &frames, const Set &set, int group, int y,
+      float *const *to, Room &room) const;
+  void measure_blocks (
+      const CodedFrames &frames, const Set &set, int group, Room &room) const;
+  void measure (const CodedFrames &frames, const Set &set, std::size_t first,
       Room &room) const;
+  void set_weights (Room &room, Field &misfit) const;
+  void mix (const CodedFrames &frames, std::span<const Set *const> sets, int y,
+      std::span<Field> slots, Room &room) const;
 
   const FilterPlan &plan_;
   MotionModels models_;

@@ -95,12 +95,11 @@ Overlap::Between::take (const CodedFrames &frames)
     frame.errors = Field (late.width (), late.height ());
     join (now.errors, next.errors, frame.errors);
   }
-  engine->stream ().take (engine->kernels ());
+  engine->stream ().take ();
 }
 
 bool
-Overlap::Between::fuse (
-    Fused &to, bool deviations, Workers &workers, std::stop_token stop)
+Overlap::Between::fuse (Fused &to, bool deviations, const Task &task)
 {
   const auto slots = std::size_t (engine->slots ());
   const auto [width, height] = engine->size ();
@@ -117,32 +116,30 @@ Overlap::Between::fuse (
   const Uncertainty::Sink of_deviations = [&] (const Uncertainty::Row &row) {
     keep (to.deviations, std::size_t (row.slot), row.y, row.deviations);
   };
-  to.known = engine->fuse (sink, workers, std::move (stop),
-      deviations ? of_deviations : Uncertainty::Sink ());
+  to.known = engine->fuse (
+      sink, task, deviations ? of_deviations : Uncertainty::Sink ());
   return to.known;
 }
 
 bool
-Overlap::Between::run (const CodedFrames &frames, bool deviations,
-    Workers &workers, std::stop_token stop)
+Overlap::Between::run (
+    const CodedFrames &frames, bool deviations, const Task &task)
 {
   std::swap (before, after);
   after.known = false;
-  if (engine->stream ().pending () > 0 &&
-      !fuse (before, deviations, workers, stop))
+  if (engine->stream ().pending () > 0 && !fuse (before, deviations, task))
     return false;
   if (!frames.after)
     return true;
   take (frames);
-  return fuse (after, deviations, workers, std::move (stop));
+  return fuse (after, deviations, task);
 }
 
 bool
-Overlap::run (const CodedFrames &frames, bool deviations, Workers &workers,
-    std::stop_token stop)
+Overlap::run (const CodedFrames &frames, bool deviations, const Task &task)
 {
   return std::ranges::all_of (between_, [&] (Between &between) {
-    return between.run (frames, deviations, workers, stop);
+    return between.run (frames, deviations, task);
   });
 }
 

@@ -41,9 +41,9 @@ sum_around (
 
 } // namespace
 
-PartnerFit::PartnerFit (
-    const Schedule &schedule, const Observation &partner, Extent size)
-    : noise_ (schedule, partner, size),
+PartnerFit::PartnerFit (const Kernels &kernels, const Schedule &schedule,
+    const Observation &partner, Extent size)
+    : kernels_ (kernels), noise_ (schedule, partner, size),
       responses_ (std::size_t (partner.slots ()),
           Field (size.width,
               std::min (size.height, schedule.tile ().period_y ()))),
@@ -89,8 +89,8 @@ PartnerFit::follow (int y, int slot, float *to) const
 }
 
 void
-PartnerFit::run (const Kernels &kernels, int y, const float *partner,
-    float *const *light, Room &room) const
+PartnerFit::run (
+    int y, const float *partner, float *const *light, Room &room) const
 {
   const int width = steps_.width (), slots = int (responses_.size ());
   room.responses_.clear ();
@@ -99,14 +99,15 @@ PartnerFit::run (const Kernels &kernels, int y, const float *partner,
   const float *const *responses = room.responses_.data ();
   float *missed = room.rows_.row (kMissed);
   float *squared = room.rows_.row (kSquared);
-  kernels.miss ({light, responses, slots, partner, width}, missed, squared);
+  kernels_.miss ({light, responses, slots, partner, width}, missed, squared);
   float *parts = room.rows_.row (kParts), *sum = room.rows_.row (kSum);
   float *squares = room.rows_.row (kSquares);
-  sum_around (kernels, missed, width, parts, sum);
-  sum_around (kernels, squared, width, parts, squares);
-  kernels.move ({missed, sum, squares, kCount, partner, noise_.slopes (y),
-                    noise_.offsets (y), kNoise, kFloor,
-                    steps_.row (y % steps_.height ()), responses, slots, width},
+  sum_around (kernels_, missed, width, parts, sum);
+  sum_around (kernels_, squared, width, parts, squares);
+  kernels_.move (
+      {missed, sum, squares, kCount, partner, noise_.slopes (y),
+          noise_.offsets (y), kNoise, kFloor, steps_.row (y % steps_.height ()),
+          responses, slots, width},
       light);
 }
 

@@ -27,8 +27,8 @@ class PartnerFit
 public:
   /** @p partner  what partners tell of the slots, behind the mirrors of
    *              @p schedule. */
-  PartnerFit (
-      const Schedule &schedule, const Observation &partner, Extent size);
+  PartnerFit (const Kernels &kernels, const Schedule &schedule,
+      const Observation &partner, Extent size);
 
   /** Of a thread. */
   class Room
@@ -45,8 +45,7 @@ public:
   /** Row @p y.
    * @p partner  the light that it saw.
    * @p light    of each slot. */
-  void run (const Kernels &kernels, int y, const float *partner,
-      float *const *light, Room &room) const;
+  void run (int y, const float *partner, float *const *light, Room &room) const;
   /** What @p light makes in row @p y of the partner. */
   void make (int y, const float *const *light, float *to) const;
 
@@ -55,6 +54,7 @@ public:
   void follow (int y, int slot, float *to) const;
 
 private:
+  const Kernels &kernels_;
   NoiseMap noise_;
   std::vector<Field> responses_; ///< m_s, of a period of rows
   Field steps_;                  ///< 1 / (sum of all m^2), likewise

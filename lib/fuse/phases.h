@@ -12,6 +12,7 @@
 
 #include "estimate/observation.h"
 #include "estimate/scene_model.h"
+#include "fuse/kernels.h"
 #include "schedule/schedule.h"
 
 namespace codedexposure::fuse
@@ -117,6 +118,7 @@ struct Stopped {
 
 /** What the filters of a schedule are made from. */
 struct FilterPlan {
+  const Kernels &kernels;
   const Phases &phases;
   const Observation &observation;
   const TapSources &sources;

@@ -96,8 +96,8 @@ Predictions::make_filters (Neighbours neighbours) const
 /* Errors of the blocks of row @row: the parts of the columns of a block are
  * added to each other. */
 void
-Predictions::predict (const Kernels &kernels, const FilterBank &filters,
-    const CodedFrames &frames, int row, Room &room) const
+Predictions::predict (const FilterBank &filters, const CodedFrames &frames,
+    int row, Room &room) const
 {
   const int *phases[2];
   for (int i = 0; i < 2; i++) {
@@ -112,11 +112,11 @@ Predictions::predict (const Kernels &kernels, const FilterBank &filters,
       if (column % 2 == 0)
         std::fill_n (to, room.parts.width (), 0.0f);
       for (int i = 0; i < 2; i++)
-        kernels.filter_squared (filters.row (phases[i][column], column, k,
-                                    room.of_rows[i], {&whole, 1}),
+        plan_.kernels.filter_squared (filters.row (phases[i][column], column, k,
+                                          room.of_rows[i], {&whole, 1}),
             &to);
     }
-    kernels.join ({period / 2, room.parts.stride (), room.rows.width ()},
+    plan_.kernels.join ({period / 2, room.parts.stride (), room.rows.width ()},
         room.parts.row (0), nullptr, room.rows.row (k));
   }
 }
@@ -125,8 +125,7 @@ Predictions::predict (const Kernels &kernels, const FilterBank &filters,
  * stands for the number of independent errors in a square.
  * @errors: of a static scene, then of each model, for row @row of blocks. */
 void
-Predictions::compare (
-    const Kernels &kernels, int row, std::span<const float *const> errors)
+Predictions::compare (int row, std::span<const float *const> errors)
 {
   auto &[unrepeated, preferences, misfit] = found_;
   const float area = float (4 * (2 * reach_ + 1) * (2 * reach_ + 1));
@@ -135,7 +134,7 @@ Predictions::compare (
   const auto repeat_last = [width] (float *values) {
     values[width] = values[width - 1];
   };
-  kernels.fade_ratio (errors.front (), errors.back (), kErrorFloor * area,
+  plan_.kernels.fade_ratio (errors.front (), errors.back (), kErrorFloor * area,
       kRepetition, width, unrepeated.row (row));
   repeat_last (unrepeated.row (row));
   float *least = misfit.row (row);
@@ -150,7 +149,7 @@ Predictions::compare (
   std::vector<float *> to;
   for (Field &preference : preferences)
     to.push_back (preference.row (row));
-  kernels.prefer (
+  plan_.kernels.prefer (
       {errors.data () + 1, models, kErrorFloor * area, kMinWeight, width},
       to.data ());
   std::ranges::for_each (to, repeat_last);
@@ -158,8 +157,8 @@ Predictions::compare (
 
 /* @band: of blocks. */
 void
-Predictions::predict_rows (const Kernels &kernels, const FilterBank &filters,
-    const CodedFrames &frames, const Band &band)
+Predictions::predict_rows (
+    const FilterBank &filters, const CodedFrames &frames, const Band &band)
 {
   Room &room = rooms_[std::size_t (band.worker)];
   const int rows = found_.misfit.height ();
@@ -167,32 +166,29 @@ Predictions::predict_rows (const Kernels &kernels, const FilterBank &filters,
   for (int row = std::max (band.first - reach_, 0); row < band.end + reach_;
        row++) {
     if (row < rows) {
-      predict (kernels, filters, frames, row, room);
+      predict (filters, frames, row, room);
       for (std::size_t k = 0; k < sums.size (); k++) {
         room.sums[k].extend (room.rows.row (int (k)));
-        room.sums[k].add_row (kernels.sum, row, room.rows.row (int (k)));
+        room.sums[k].add_row (plan_.kernels.sum, row, room.rows.row (int (k)));
       }
     }
     if (row - reach_ < band.first)
       continue;
     for (std::size_t k = 0; k < sums.size (); k++)
-      sums[k] = room.sums[k].result (kernels.sum, row - reach_);
-    compare (kernels, row - reach_, sums);
+      sums[k] = room.sums[k].result (plan_.kernels.sum, row - reach_);
+    compare (row - reach_, sums);
   }
 }
 
 const Predictions::Found *
-Predictions::run (const Kernels &kernels, const CodedFrames &frames,
-    Workers &workers, std::stop_token stop)
+Predictions::run (const CodedFrames &frames, const Task &task)
 {
   const Neighbours used = models_.used (frames.neighbours ());
   const FilterBank &filters =
       filters_.get (used, [&] { return make_filters (used); });
-  rooms_.resize (std::size_t (workers.count ()), rooms_.front ());
-  const bool done = run_bands (workers, found_.misfit.height (), kMinRows,
-      std::move (stop), [&] (const Band &band) {
-        predict_rows (kernels, filters, frames, band);
-      });
+  rooms_.resize (std::size_t (task.workers.count ()), rooms_.front ());
+  const bool done = run_bands (task, found_.misfit.height (), kMinRows,
+      [&] (const Band &band) { predict_rows (filters, frames, band); });
   return done ? &found_ : nullptr;
 }
 

@@ -40,8 +40,7 @@ public:
     Field misfit;
   };
   /** Null when it was stopped. Valid until it runs again. */
-  const Found *run (const Kernels &kernels, const CodedFrames &frames,
-      Workers &workers, std::stop_token stop);
+  const Found *run (const CodedFrames &frames, const Task &task);
 
 private:
   /** Of a thread. */
@@ -53,12 +52,11 @@ private:
   };
 
   FilterBank make_filters (Neighbours neighbours) const;
-  void predict (const Kernels &kernels, const FilterBank &filters,
-      const CodedFrames &frames, int row, Room &room) const;
-  void predict_rows (const Kernels &kernels, const FilterBank &filters,
-      const CodedFrames &frames, const Band &band);
-  void compare (
-      const Kernels &kernels, int row, std::span<const float *const> errors);
+  void predict (const FilterBank &filters, const CodedFrames &frames, int row,
+      Room &room) const;
+  void predict_rows (
+      const FilterBank &filters, const CodedFrames &frames, const Band &band);
+  void compare (int row, std::span<const float *const> errors);
 
   const FilterPlan &plan_;
   Models models_;

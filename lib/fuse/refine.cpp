@@ -61,12 +61,13 @@ Refiner::why_not (
   return {};
 }
 
-Refiner::Refiner (const Schedule &schedule, const Observation &observation,
-    int width, int height, double noise)
-    : slots_ (schedule.slots ()), width_ (width), height_ (height),
-      noise_free_ (observation.noise_free ()), leak_ (float (schedule.leak ())),
-      whole_ (float (schedule.light (0))), noise_ (float (noise) * whole_),
-      slot_of_ (width, height), mean_ (width, height),
+Refiner::Refiner (const Kernels &kernels, const Schedule &schedule,
+    const Observation &observation, int width, int height, double noise)
+    : kernels_ (kernels), slots_ (schedule.slots ()), width_ (width),
+      height_ (height), noise_free_ (observation.noise_free ()),
+      leak_ (float (schedule.leak ())), whole_ (float (schedule.light (0))),
+      noise_ (float (noise) * whole_), slot_of_ (width, height),
+      mean_ (width, height),
       refined_ (std::size_t (slots_), Field (width, height))
 {
   if (leak_ > 0.0f)
@@ -209,13 +210,12 @@ Refiner::correct_row (
  * well, as far as they depend on it, so that the parts do not change the
  * result. */
 void
-Refiner::refine_part (
-    const Kernels &kernels, const Frame &frame, int slot, int from, int to)
+Refiner::refine_part (const Frame &frame, int slot, int from, int to)
 {
   const int first = from - Net::kReach;
   std::vector<std::int16_t> planes (std::size_t (Net::kPlanes * width_));
   Net::trained ().run (
-      kernels, half (width_) + 2 * Net::kReach, to - from + 2 * Net::kReach,
+      kernels_, half (width_) + 2 * Net::kReach, to - from + 2 * Net::kReach,
       [&] (int y, std::int16_t *row) {
         fold_row (frame, slot, first + y, planes.data (), row);
       },
@@ -230,9 +230,8 @@ Refiner::refine_part (
 }
 
 bool
-Refiner::run (const Kernels &kernels, const CodedFrames &frames,
-    const Field &is_static, std::vector<Field> &light,
-    std::vector<Field> *deviations, Workers &workers, std::stop_token stop)
+Refiner::run (const CodedFrames &frames, const Field &is_static,
+    std::vector<Field> &light, std::vector<Field> *deviations, const Task &task)
 {
   if (deviations)
     deviations->resize (light.size (), Field (width_, height_));
@@ -251,13 +250,14 @@ Refiner::run (const Kernels &kernels, const CodedFrames &frames,
     frame.seen[i] = leak_ > 0.0f ? &own_[i] : &coded[i]->light;
   }
   const int rows = half (height_);
-  const int parts = slots_ % workers.count () == 0 ? 1 : workers.count ();
-  const auto refine = [&] (int task, int) {
-    const int part = task % parts;
-    refine_part (kernels, frame, task / parts, rows * part / parts,
-        rows * (part + 1) / parts);
+  const int threads = task.workers.count ();
+  const int parts = slots_ % threads == 0 ? 1 : threads;
+  const auto refine = [&] (int number, int) {
+    const int part = number % parts;
+    refine_part (
+        frame, number / parts, rows * part / parts, rows * (part + 1) / parts);
   };
-  if (!workers.run (slots_ * parts, refine, std::move (stop)))
+  if (!task.run (slots_ * parts, refine))
     return false;
   light.swap (refined_);
   return true;

@@ -4,12 +4,11 @@
 
 #include <array>
 #include <cstdint>
-#include <stop_token>
 #include <string>
 #include <vector>
 
-#include "base/workers.h"
 #include "estimate/observation.h"
+#include "fuse/bands.h"
 #include "fuse/coded_stream.h"
 #include "fuse/refine_network.h"
 #include "schedule/schedule.h"
@@ -40,8 +39,8 @@ public:
   /** Largest off-state leakage that is undone. */
   static constexpr double kMaxLeak = 0.05;
 
-  Refiner (const Schedule &schedule, const Observation &observation, int width,
-      int height, double noise);
+  Refiner (const Kernels &kernels, const Schedule &schedule,
+      const Observation &observation, int width, int height, double noise);
 
   /** Refines the fused light of every slot.
    * @p is_static   weight of static pixels, 0 to 1.
@@ -49,9 +48,9 @@ public:
    *                the width of the interval of 68 % of the errors of refined
    *                pixels, in grey levels, without rounding.
    * False when it was stopped. */
-  bool run (const Kernels &kernels, const CodedFrames &frames,
-      const Field &is_static, std::vector<Field> &light,
-      std::vector<Field> *deviations, Workers &workers, std::stop_token stop);
+  bool run (const CodedFrames &frames, const Field &is_static,
+      std::vector<Field> &light, std::vector<Field> *deviations,
+      const Task &task);
 
 private:
   /** A fused frame. */
@@ -68,14 +67,14 @@ private:
    * @p light. */
   void undo_leakage (
       const Field &coded, const std::vector<Field> &light, Field &own) const;
-  void refine_part (
-      const Kernels &kernels, const Frame &frame, int slot, int from, int to);
+  void refine_part (const Frame &frame, int slot, int from, int to);
   void set_planes (const Frame &frame, int slot, int y, std::int16_t *to) const;
   void fold_row (const Frame &frame, int slot, int row, std::int16_t *planes,
       std::int16_t *to) const;
   void correct_row (
       const Frame &frame, const float *results, int slot, int y, int part);
 
+  const Kernels &kernels_;
   int slots_, width_, height_;
   bool noise_free_;
   float leak_;  ///< off-state leakage

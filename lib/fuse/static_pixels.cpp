@@ -43,9 +43,9 @@ NoiseMap::NoiseMap (
     }
 }
 
-StaticPixels::StaticPixels (
-    const NoiseMap &noise, Extent size, int radius, bool average, float largest)
-    : noise_ (noise), radius_ (radius), average_ (average),
+StaticPixels::StaticPixels (const Kernels &kernels, const NoiseMap &noise,
+    Extent size, int radius, bool average, float largest)
+    : kernels_ (kernels), noise_ (noise), radius_ (radius), average_ (average),
       steps_ (65535.0f / largest),
       rooms_ (1, {Field (size.width, 1, radius),
                      BoxFilter (size.width, size.height, radius),
@@ -62,8 +62,7 @@ StaticPixels::StaticPixels (
 
 /* Sets @rating by the differences of the frames of @pair. */
 void
-StaticPixels::compare (
-    const Kernels &kernels, const Pair &pair, const Band &band, Field &rating)
+StaticPixels::compare (const Pair &pair, const Band &band, Field &rating)
 {
   const auto &[now, other, count, unrepeated] = pair;
   auto &[changes, sums, maxima] = rooms_[std::size_t (band.worker)];
@@ -73,18 +72,18 @@ StaticPixels::compare (
   for (int y = std::max (band.first - radius_, 0); y < band.end + radius_;
        y++) {
     if (y < height) {
-      kernels.compare (
+      kernels_.compare (
           {now.row (y), other.row (y), noise_.slopes (y), noise_.offsets (y),
               count ? count->row (y) : nullptr, kFloor, width},
           change);
       sums.extend (change);
-      sums.add_row (kernels.sum, y, change);
-      maxima.add_row (kernels.max, y, change);
+      sums.add_row (kernels_.sum, y, change);
+      maxima.add_row (kernels_.max, y, change);
     }
     const int out = y - radius_;
     if (out >= band.first)
-      kernels.rate (
-          {sums.result (kernels.sum, out), maxima.result (kernels.max, out),
+      kernels_.rate (
+          {sums.result (kernels_.sum, out), maxima.result (kernels_.max, out),
               unrepeated.row (std::min (out / 2, unrepeated.height () - 1)),
               area, kMeanChange, kLargestChange, width},
           rating.row (out));
@@ -120,12 +119,12 @@ StaticPixels::average_row (int y, const float *now)
 }
 
 std::optional<StaticPixels::Found>
-StaticPixels::take (const Kernels &kernels, const CodedFrames &frames,
-    const Field &unrepeated, Workers &workers, std::stop_token stop)
+StaticPixels::take (
+    const CodedFrames &frames, const Field &unrepeated, const Task &task)
 {
   const Field &now = frames.now->light;
   const int width = now.width (), height = now.height ();
-  rooms_.resize (std::size_t (workers.count ()), rooms_.front ());
+  rooms_.resize (std::size_t (task.workers.count ()), rooms_.front ());
   const auto compare_with_past = [&] (const Band &band) {
     if (!frames.before) {
       for (int y = band.first; y < band.end; y++)
@@ -134,19 +133,17 @@ StaticPixels::take (const Kernels &kernels, const CodedFrames &frames,
     }
     const Field &before = frames.before->light;
     if (!average_)
-      return compare (
-          kernels, {now, before, nullptr, unrepeated}, band, weight_);
-    compare (kernels, {now, mean_, &count_, unrepeated}, band, weight_);
+      return compare ({now, before, nullptr, unrepeated}, band, weight_);
+    compare ({now, mean_, &count_, unrepeated}, band, weight_);
     if (!compared_)
-      compare (kernels, {now, before, nullptr, unrepeated}, band, unchanged_);
+      compare ({now, before, nullptr, unrepeated}, band, unchanged_);
   };
   const auto add = [&] (const Band &band) {
     for (int y = band.first; average_ && y < band.end; y++)
       average_row (y, now.row (y));
     if (!frames.after)
       return;
-    compare (kernels, {frames.after->light, now, nullptr, unrepeated}, band,
-        unchanged_);
+    compare ({frames.after->light, now, nullptr, unrepeated}, band, unchanged_);
     for (int y = band.first; y < band.end; y++) {
       const float *unchanged = unchanged_.row (y);
       float *weight = weight_.row (y);
@@ -154,8 +151,8 @@ StaticPixels::take (const Kernels &kernels, const CodedFrames &frames,
         weight[x] = std::max (weight[x], unchanged[x]);
     }
   };
-  if (!run_bands (workers, height, kMinRows, stop, compare_with_past) ||
-      !run_bands (workers, height, kMinRows, stop, add))
+  if (!run_bands (task, height, kMinRows, compare_with_past) ||
+      !run_bands (task, height, kMinRows, add))
     return {};
   frames_++;
   compared_ = frames.after != nullptr;
@@ -165,7 +162,7 @@ StaticPixels::take (const Kernels &kernels, const CodedFrames &frames,
 }
 
 void
-StaticPixels::smooth (const Kernels &kernels, const Found &found, Field &light)
+StaticPixels::smooth (const Found &found, Field &light)
 {
   auto &[differences, sums, maxima] = rooms_.front ();
   const int width = light.width (), height = light.height ();
@@ -177,13 +174,13 @@ StaticPixels::smooth (const Kernels &kernels, const Found &found, Field &light)
       for (int x = 0; x < width; x++)
         squared[x] = (own[x] - other[x]) * (own[x] - other[x]);
       sums.extend (squared);
-      sums.add_row (kernels.sum, y, squared);
+      sums.add_row (kernels_.sum, y, squared);
     }
     const int out = y - radius_;
     if (out < 0)
       continue;
     const float *own = found.light.row (out);
-    const float *around = sums.result (kernels.sum, out);
+    const float *around = sums.result (kernels_.sum, out);
     const float *slope = noise_.slopes (out), *offset = noise_.offsets (out);
     float *to = light.row (out);
     for (int x = 0; x < width; x++) {

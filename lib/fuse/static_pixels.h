@@ -51,8 +51,8 @@ public:
    *  @p radius   of the surroundings, which contain every slot, px.
    *  @p average  over frames.
    *  @p largest  light of a pixel, 255 for white. */
-  StaticPixels (const NoiseMap &noise, Extent size, int radius, bool average,
-      float largest);
+  StaticPixels (const Kernels &kernels, const NoiseMap &noise, Extent size,
+      int radius, bool average, float largest);
   int radius () const { return radius_; }
 
   /** Of a coded frame. */
@@ -71,8 +71,8 @@ public:
   /** Takes the next coded frame, and finds its static pixels.
    * @p unrepeated  see Predictions::Found.
    * Nothing when it was stopped. Valid until the next one is taken. */
-  std::optional<Found> take (const Kernels &kernels, const CodedFrames &frames,
-      const Field &unrepeated, Workers &workers, std::stop_token stop);
+  std::optional<Found> take (
+      const CodedFrames &frames, const Field &unrepeated, const Task &task);
   /**
    * With noise, static pixels of a smooth picture are truer if they are also
    * averaged over their surroundings.
@@ -80,7 +80,7 @@ public:
    *           towards them by the part of the squared differences around it
    *           that noise explains: a local Wiener filter.
    */
-  void smooth (const Kernels &kernels, const Found &found, Field &light);
+  void smooth (const Found &found, Field &light);
 
   /** Found::weight of the last frame. */
   const Field &weight () const { return weight_; }
@@ -94,10 +94,10 @@ private:
     const Field *count; ///< frames of which other is the mean; null: one
     const Field &unrepeated;
   };
-  void compare (const Kernels &kernels, const Pair &pair, const Band &band,
-      Field &rating);
+  void compare (const Pair &pair, const Band &band, Field &rating);
   void average_row (int y, const float *now);
 
+  const Kernels &kernels_;
   const NoiseMap &noise_;
   int radius_;
   bool average_;

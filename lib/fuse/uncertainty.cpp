@@ -45,8 +45,9 @@ log_of (float square)
 
 Uncertainty::Uncertainty (const Schedule &schedule, const FilterPlan &plan,
     FuseQuality quality, Extent size, double depth)
-    : phases_ (plan.phases), slots_ (plan.observation.slots ()),
-      quality_ (quality), noise_free_ (plan.observation.noise_free ()),
+    : kernels_ (plan.kernels), phases_ (plan.phases),
+      slots_ (plan.observation.slots ()), quality_ (quality),
+      noise_free_ (plan.observation.noise_free ()),
       rounding_ (float (255.0 * 255.0 / (12.0 * depth * depth))),
       slot_of_ (size.width, size.height)
 {
@@ -150,8 +151,7 @@ Uncertainty::add_known (const Frame &frame, int slot, int y,
 }
 
 void
-Uncertainty::run_slot (const Kernels &kernels, const Frame &frame, int slot,
-    const Sink &sink) const
+Uncertainty::run_slot (const Frame &frame, int slot, const Sink &sink) const
 {
   const int width = slot_of_.width (), height = slot_of_.height ();
   BoxFilter changes (width, height, kAround), roughs (changes);
@@ -164,14 +164,14 @@ Uncertainty::run_slot (const Kernels &kernels, const Frame &frame, int slot,
       for (int i = 0; i < 2; i++) {
         BoxFilter &box = i ? roughs : changes;
         box.extend (rows.row (i));
-        box.add_row (kernels.sum, y, rows.row (i));
+        box.add_row (kernels_.sum, y, rows.row (i));
       }
     }
     const int out = y - kAround;
     if (out < 0)
       continue;
-    set_pixels (frame, slot, out, changes.result (kernels.sum, out),
-        roughs.result (kernels.sum, out), pixels);
+    set_pixels (frame, slot, out, changes.result (kernels_.sum, out),
+        roughs.result (kernels_.sum, out), pixels);
     const float *weight = frame.still.weight.row (out);
     const float *refined = frame.refined
                                ? (*frame.refined)[std::size_t (slot)].row (out)
@@ -198,12 +198,10 @@ Uncertainty::run_slot (const Kernels &kernels, const Frame &frame, int slot,
 }
 
 bool
-Uncertainty::run (const Kernels &kernels, const Frame &frame, const Sink &sink,
-    Workers &workers, std::stop_token stop) const
+Uncertainty::run (const Frame &frame, const Sink &sink, const Task &task) const
 {
-  return workers.run (
-      slots_, [&] (int slot, int) { run_slot (kernels, frame, slot, sink); },
-      std::move (stop));
+  return task.run (
+      slots_, [&] (int slot, int) { run_slot (frame, slot, sink); });
 }
 
 } // namespace codedexposure::fuse

@@ -6,10 +6,9 @@
 #include <cstdint>
 #include <functional>
 #include <span>
-#include <stop_token>
 #include <vector>
 
-#include "base/workers.h"
+#include "fuse/bands.h"
 #include "fuse/coded_stream.h"
 #include "fuse/fuser.h"
 #include "fuse/partner_fit.h"
@@ -77,12 +76,10 @@ public:
   };
   using Sink = std::function<void (const Row &row)>;
   /** False when it was stopped. */
-  bool run (const Kernels &kernels, const Frame &frame, const Sink &sink,
-      Workers &workers, std::stop_token stop) const;
+  bool run (const Frame &frame, const Sink &sink, const Task &task) const;
 
 private:
-  void run_slot (const Kernels &kernels, const Frame &frame, int slot,
-      const Sink &sink) const;
+  void run_slot (const Frame &frame, int slot, const Sink &sink) const;
   /** Squared D and L of row @p y, before their mean. */
   void differences (
       const Frame &frame, int slot, int y, float *change, float *rough) const;
@@ -92,6 +89,7 @@ private:
       std::span<const Pixel> pixels, float *squares) const;
   float deviation (const Pixel &pixel) const;
 
+  const Kernels &kernels_;
   const Phases &phases_;
   int slots_;
   FuseQuality quality_;

@@ -144,7 +144,7 @@ write_features (const Scene &scene, int number, int n, bool noisy, bool both,
               seen.errors.at (x, y) * seen.errors.at (x, y);
         }
     }
-    engine->stream ().take (engine->kernels ());
+    engine->stream ().take ();
     std::vector<Field> fused (std::size_t (n), Field (width, height));
     const auto write = [&] (const fuse::Uncertainty::Row &row) {
       const Picture &truth =
@@ -175,7 +175,7 @@ write_features (const Scene &scene, int number, int n, bool noisy, bool both,
           for (int s = 0; s < n; s++)
             std::copy_n (rows[s], width, fused[std::size_t (s)].row (y));
         },
-        workers, {}, write);
+        {workers, {}}, write);
   }
 }
 

@@ -240,8 +240,8 @@ some_light (int number)
 TEST (Refine, TheFramesBeforeAndAfterAndASecondCameraAreSeen)
 {
   const Schedule schedule = Schedule::parse ("sequential:2x2").value ();
-  fuse::Refiner refiner (
-      schedule, Observation (schedule, {}, 0.0, 255.0), kWidth, kHeight, 0.0);
+  fuse::Refiner refiner (fuse::supported_kernels ().front (), schedule,
+      Observation (schedule, {}, 0.0, 255.0), kWidth, kHeight, 0.0);
   fuse::CodedFrame before, now, after;
   before.light = some_light (1);
   now.light = some_light (2);
@@ -255,8 +255,8 @@ TEST (Refine, TheFramesBeforeAndAfterAndASecondCameraAreSeen)
   const auto refine = [&] (const fuse::CodedFrames &frames) {
     auto light = slots;
     std::vector<Field> deviation;
-    EXPECT_TRUE (refiner.run (fuse::supported_kernels ().front (), frames,
-        moving, light, &deviation, workers, {}));
+    EXPECT_TRUE (
+        refiner.run (frames, moving, light, &deviation, {workers, {}}));
     for (auto *to : {&results, &deviations}) {
       to->emplace_back ();
       for (const Field &slot : to == &results ? light : deviation)

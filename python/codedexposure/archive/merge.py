@@ -90,7 +90,8 @@ def link(old, new):
 def join_pictures(parts, output):
     """Pictures have the numbers of the whole recording."""
     folder = output.rstrip('/')
-    new = f'{folder}.part'
+    # Hidden, so that it is no folder of recordings, which are searched for.
+    new = os.path.join(os.path.dirname(folder), f'.{os.path.basename(folder)}.part')
     shutil.rmtree(new, ignore_errors=True)
     os.makedirs(new)
     join_tables([os.path.join(part, TABLE) for part in parts],
@@ -103,7 +104,8 @@ def join_pictures(parts, output):
 
 
 def put_pictures(new, folder, force=True):
-    """As decode does: pictures of an earlier run go, and other files stay."""
+    """As decode and report do: pictures of an earlier run go, and other files
+    stay. The page of a report comes last."""
     try:
         os.rename(new, folder)  # there is none, or it is empty
         return
@@ -111,12 +113,15 @@ def put_pictures(new, folder, force=True):
         if not force:
             raise
     with contextlib.suppress(FileNotFoundError):
-        with open(os.path.join(folder, TABLE), encoding='utf-8') as table:
+        with open(os.path.join(folder, TABLE), encoding='utf-8',
+                  errors='replace') as table:
             for line in list(table)[1:]:
                 name = os.path.basename(line.partition(',')[0])
-                pathlib.Path(folder, name).unlink(missing_ok=True)
-    for name in os.listdir(new):
-        os.replace(os.path.join(new, name), os.path.join(folder, name))
+                if name.endswith('.png'):
+                    pathlib.Path(folder, name).unlink(missing_ok=True)
+    for name in sorted(os.listdir(new), key='index.html'.__eq__):
+        part, path = os.path.join(new, name), os.path.join(folder, name)
+        (put_pictures if os.path.isdir(part) else os.replace)(part, path)
     os.rmdir(new)
 
 
@@ -138,8 +143,7 @@ def write_report(plan, recording, output, scratch):
                       ' '.join(programs.last_lines(log)))
     for name in files_below(new):
         sync(os.path.join(new, name))
-    shutil.rmtree(output, ignore_errors=True)
-    os.rename(new, output)
+    put_pictures(new, output)
 
 
 def merge(store, plan, recording):

@@ -276,7 +276,8 @@ def check_outputs(folder, plan):
     inputs = [path for recording in plan.recordings
               for path in (recording.path, recording.second) if path]
     known = {identity_of(path) for path in inputs}
-    there = [path for path in sorted(paths) if os.path.isfile(path)]
+    there = [name for path in sorted(paths) for name in (path, f'{path}.part')
+             if os.path.isfile(name)]
     for path, said in zip(there, programs.info(there)):
         if identity_of(path) in known or 'schedule' in said:
             raise Problem(f'{path} is a recording, and would be replaced; choose '

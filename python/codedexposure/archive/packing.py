@@ -13,7 +13,10 @@ DAMAGED = 3  # status of pack
 
 
 def raw_recordings(paths):
-    """Those that are not packed yet."""
+    """Those that are not packed yet. Raises Problem if one is no recording."""
+    for said in paths:
+        if 'error' in said:
+            raise Problem(said['error'])
     return [said['recording'] for said in paths if said['codec'] == 'raw']
 
 

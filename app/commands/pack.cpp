@@ -224,14 +224,18 @@ Pack::run ()
   const std::string recording = fs::canonical (recording_, ignored);
   const std::string output = output_.value_or (recording);
   check_names (recording, output);
-  if (run_.print) {
-    encode (recording, output, false);
-    return Exit::done;
-  }
   if (info.head.codec != MatroskaHead::Codec::raw) {
     if (output_)
       fail (recording + " is FFV1 already; copy it");
     status_.line (recording + " is FFV1 already");
+    return Exit::done;
+  }
+  if (run_.print) {
+    if (!output_)
+      usage_error ("--print shows a line that checks nothing, and so must not "
+                   "replace " +
+                   recording_ + "; set --output to another file");
+    encode (recording, output, false);
     return Exit::done;
   }
   check_extras (info.extras);

@@ -137,7 +137,7 @@ SourceOptions::declare_camera (Options &options, Kind kind)
   options.value ("--exposure", exposure, "US",
       examined ? "longest exposure time, microseconds [99 % of the period]"
                : "exposure time, microseconds [as the camera has it]",
-      real (1e-3, 1e9, "a time in microseconds"));
+      real (1e-3, 1e8, "a time in microseconds"));
   options.value ("--pixel-format", pixel_format, "F",
       "Mono8, Mono12, Mono12Packed ... [Mono8; Mono16]", pixel_formats ());
   options.value (

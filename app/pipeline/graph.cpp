@@ -83,7 +83,34 @@ Graph::add_text (const std::string &description)
   return bin;
 }
 
-/* A text is set as it is: only the parser of gst-launch-1.0 unescapes it. */
+namespace
+{
+
+/* Reads @text into @value. Returns what it must be; empty: it is that. */
+std::string
+read_value (const std::string &text, GParamSpec *spec, GValue *value)
+{
+  if (!gst_value_deserialize_with_pspec (value, text.c_str (), spec))
+    return std::string ("a ") + g_type_name (spec->value_type);
+  GValue nearest = G_VALUE_INIT;
+  g_value_init (&nearest, spec->value_type);
+  g_value_copy (value, &nearest);
+  std::string rule;
+  if (g_param_value_validate (spec, &nearest)) {
+    const CharPtr limit (gst_value_serialize (&nearest));
+    const bool is_below =
+        gst_value_compare (value, &nearest) == GST_VALUE_LESS_THAN;
+    rule = (is_below ? "at least " : "at most ") + std::string (limit.get ());
+  }
+  g_value_unset (&nearest);
+  return rule;
+}
+
+} // namespace
+
+/* A text is set as it is: only the parser of gst-launch-1.0 unescapes it. A
+ * value that GLib would replace by the default is an error; options that are
+ * not checked before have the names of their properties. */
 void
 Graph::set (GstElement *element, const Setting &setting) const
 {
@@ -93,10 +120,19 @@ Graph::set (GstElement *element, const Setting &setting) const
   if (!spec)
     fail ("the element \"" + factory_of (element) + "\" has no property \"" +
           setting.name + "\"; install the version that this program needs");
-  if (spec->value_type == G_TYPE_STRING)
+  if (spec->value_type == G_TYPE_STRING) {
     g_object_set (object, setting.name, setting.value.c_str (), nullptr);
-  else
-    gst_util_set_object_arg (object, setting.name, setting.value.c_str ());
+    return;
+  }
+  GValue value = G_VALUE_INIT;
+  g_value_init (&value, spec->value_type);
+  const std::string rule = read_value (setting.value, spec, &value);
+  if (rule.empty ())
+    g_object_set_property (object, setting.name, &value);
+  g_value_unset (&value);
+  if (!rule.empty ())
+    usage_error ("--" + std::string (setting.name) + " must be " + rule +
+                 ", not " + setting.value);
 }
 
 namespace

@@ -198,6 +198,7 @@ CodedFilter::begin ()
   resume ();
   const ObjectLock lock (element_);
   shared_.counters = CodedCounters ();
+  reset_counters ();
 }
 
 void

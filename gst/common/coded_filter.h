@@ -206,6 +206,8 @@ protected:
   }
   /** After FLUSH_STOP went downstream. */
   virtual void flushed () {}
+  /** A run starts: its counters are 0. Object lock. */
+  virtual void reset_counters () {}
   /** Puts the subclass's settings into force. Object lock. */
   virtual void take_settings () {}
   /** Forgets the stream; from PAUSED to READY. */

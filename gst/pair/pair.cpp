@@ -63,7 +63,7 @@
  * or `other-exposure`. #codedexposure-pair:frames-paired,
  * #codedexposure-pair:pairs-confirmed, #codedexposure-pair:frames-alone,
  * #codedexposure-pair:pairs-refused and #codedexposure-pair:partners-dropped
- * count.
+ * count, and can be read until the next run starts.
  *
  * ## Example pipeline
  * |[
@@ -235,6 +235,9 @@ end (GstCodedExposurePair *self)
 {
   PairState &st = state (self);
   st.alone.end (self);
+  GstAggregatorPad *off = sink (self, "off");
+  while (const BufferPtr left{gst_aggregator_pad_pop_buffer (off)})
+    locked (self, [&] { return ++st.counters.dropped; });
   if (st.is_due ()) {
     st.has_ended = true;
     gst_aggregator_finish_buffer (GST_AGGREGATOR (self), gst_buffer_new ());
@@ -355,14 +358,21 @@ update_caps (GstAggregator *aggregator, GstCaps *, GstCaps **made)
   return GST_FLOW_OK;
 }
 
+/* What was counted can be read until the next run begins. */
 gboolean
-stop (GstAggregator *aggregator)
+start (GstAggregator *aggregator)
 {
   PairState &st = state (aggregator);
-  static_cast<Run &> (st) = {};
   const ObjectLock lock (aggregator);
   st.counters = {};
   st.shift = kUnknown;
+  return TRUE;
+}
+
+gboolean
+stop (GstAggregator *aggregator)
+{
+  static_cast<Run &> (state (aggregator)) = {};
   return TRUE;
 }
 
@@ -424,6 +434,7 @@ set_up (gpointer klass)
   aggregator->src_event = GST_DEBUG_FUNCPTR (src_event);
   aggregator->src_query = GST_DEBUG_FUNCPTR (src_query);
   aggregator->flush = GST_DEBUG_FUNCPTR (flush);
+  aggregator->start = GST_DEBUG_FUNCPTR (start);
   aggregator->stop = GST_DEBUG_FUNCPTR (stop);
   for (const char *name : {"on", "off"})
     add_pad_template (klass, name,

@@ -19,7 +19,8 @@
  * mirror, and the rows of the pilot are left out, as in fused frames.
  *
  * A coded frame without a partner has no sum: a GAP event takes its place, and
- * #codedexposure-sum:frames-alone counts it. codedexposure-pair posts why.
+ * #codedexposure-sum:frames-alone counts it, until the next run starts.
+ * codedexposure-pair posts why.
  *
  * ## Example pipelines
  * |[
@@ -92,7 +93,8 @@ private:
   GstFlowReturn process (CodedFrame frame) override;
   Reach reach () const override { return {}; }
   bool plan (const CodedFormat &format, PadCaps &caps) override;
-  void forget () override;
+  void reset_counters () override { settings_.alone = 0; }
+  void forget () override { plan_.reset (); }
   CapsScale scale_for (
       const Schedule &schedule, const GstCodedPad *) const override
   {
@@ -193,14 +195,6 @@ Sum::plan (const CodedFormat &format, PadCaps &caps)
   gst_video_info_from_caps (&made->info, sum.get ());
   plan_ = *std::move (made);
   return true;
-}
-
-void
-Sum::forget ()
-{
-  plan_.reset ();
-  const ObjectLock lock (element ());
-  settings_.alone = 0;
 }
 
 template <typename Pixel>

@@ -234,4 +234,24 @@ TEST_F (Pair, WhatComesBeforeAnEndWithoutFramesComesOutInItsOrder)
                         GST_EVENT_SEGMENT, GST_EVENT_TAG, GST_EVENT_GAP}));
 }
 
+TEST_F (Pair, FramesOfTheSecondCameraThatAreLeftAtTheEndCountAsDropped)
+{
+  for (GstHarness *camera : {off.get (), pair.get ()})
+    gst_harness_push (camera, numbered (0, 0).release ());
+  const BufferPtr first (gst_harness_pull (pair.get ()));
+  gst_harness_push (off.get (), numbered (1, kPeriod).release ());
+  EXPECT_EQ (run ({}, {}), Numbers{});
+  expect_counters (1, 0, 0, 1);
+}
+
+TEST_F (Pair, CountersCanBeReadUntilTheNextRunStarts)
+{
+  run (frames ({0, 1, 2}), frames ({0, 2}));
+  ASSERT_EQ (gst_element_set_state (pair.element (), GST_STATE_READY),
+      GST_STATE_CHANGE_SUCCESS);
+  expect_counters (2, 1, 0, 0);
+  gst_element_set_state (pair.element (), GST_STATE_PAUSED);
+  expect_counters (0, 0, 0, 0);
+}
+
 } // namespace

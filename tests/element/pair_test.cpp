@@ -27,7 +27,7 @@ TEST_F (Pair, IsNotWhatIsFartherAway)
 {
   EXPECT_EQ (run (frames ({0, 1, 2}), frames ({0, 1, 2}, 10 * kMs + 1)),
       (Numbers{{0, kAlone}, {1, kAlone}, {2, kAlone}}));
-  expect_counters (0, 3, 0, 2);
+  expect_counters (0, 3, 0, 3);
   expect_lost ("missing", 3, 0, 2 * kPeriod);
 }
 

@@ -140,6 +140,16 @@ TEST_F (Sum, OfAFrameAloneIsAGap)
   }
 }
 
+TEST_F (Sum, FramesAloneCanBeReadUntilTheNextRunStarts)
+{
+  tell ();
+  ASSERT_EQ (sum.push (pair (0, true)), GST_FLOW_OK);
+  gst_element_set_state (sum.element (), GST_STATE_READY);
+  EXPECT_EQ (property<guint64> (sum.element (), "frames-alone"), 1u);
+  gst_element_set_state (sum.element (), GST_STATE_PAUSED);
+  EXPECT_EQ (property<guint64> (sum.element (), "frames-alone"), 0u);
+}
+
 TEST_F (Sum, WithoutASecondCameraSaysWhatIsMissing)
 {
   setup.partner.reset ();

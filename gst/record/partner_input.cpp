@@ -82,9 +82,12 @@ PartnerInput::chain (
   PartnerInput &self = input_of (pad);
   BufferPtr owned (buffer);
   std::unique_lock lock (self.lock_);
+  const auto is_left = [&] {
+    return self.segments_.own.count < self.segments_.frames.count;
+  };
   const auto has_room = [&] {
     return self.partners_.size () < kMost || !self.is_wanted_ ||
-           self.is_flushing_;
+           self.is_flushing_ || is_left ();
   };
   while (!has_room ()) {
     if (!self.is_ahead_ && self.moved_.wait_for (lock, kPatience, has_room))
@@ -95,7 +98,7 @@ PartnerInput::chain (
   }
   if (self.is_flushing_)
     return GST_FLOW_FLUSHING;
-  if (!self.is_wanted_ || !self.caps_)
+  if (!self.is_wanted_ || !self.caps_ || is_left ())
     return GST_FLOW_OK;
   self.is_stalled_ = false;
   self.moved_.notify_all ();
@@ -104,7 +107,8 @@ PartnerInput::chain (
     return GST_FLOW_OK;
   }
   self.partners_.push_back (
-      {std::move (owned), CapsPtr (gst_caps_ref (self.caps_.get ()))});
+      {{std::move (owned), CapsPtr (gst_caps_ref (self.caps_.get ()))},
+          self.segments_.own.count});
   return GST_FLOW_OK;
 }
 
@@ -128,6 +132,9 @@ PartnerInput::event (GstPad *pad, GstObject *, GstEvent *owned) noexcept
       self.has_ended_ = false;
     }
     break;
+  case GST_EVENT_SEGMENT:
+    self.segments_.own.follow (event.get ());
+    break;
   case GST_EVENT_EOS:
     self.has_ended_ = true;
     break;
@@ -138,6 +145,7 @@ PartnerInput::event (GstPad *pad, GstObject *, GstEvent *owned) noexcept
     self.is_flushing_ = self.has_ended_ = false;
     self.is_wanted_ = true;
     self.partners_.clear ();
+    self.segments_.own = {};
     break;
   default:
     break;
@@ -156,6 +164,26 @@ PartnerInput::restart ()
   caps_.reset ();
   may_wait_ = is_wanted_ = true;
   is_off_beam_ = has_ended_ = is_stalled_ = is_ahead_ = false;
+  segments_ = {};
+}
+
+void
+PartnerInput::next_segment (GstEvent *segment)
+{
+  locked (lock_, [&] {
+    segments_.frames.follow (segment);
+    while (!partners_.empty () &&
+           partners_.front ().segment < segments_.frames.count)
+      partners_.pop_front ();
+  });
+  moved_.notify_all ();
+}
+
+void
+PartnerInput::forget ()
+{
+  alone_.forget ();
+  locked (lock_, [&] { return segments_.frames = {}; });
 }
 
 void
@@ -167,14 +195,16 @@ PartnerInput::let_wait (bool waits)
 
 /* A frame that came late when it was recorded is in the place of its partner,
  * too. */
-bool
+GstFlowReturn
 PartnerInput::take (
     GstElement *element, GstClockTime pts, std::optional<Partner> &to)
 {
   std::unique_lock lock (lock_);
   is_ahead_ = false;
-  const auto time_of = [] (const Partner &partner) {
-    return GST_BUFFER_PTS (partner.buffer.get ());
+  const auto time_of = [this] (const Waiting &partner) {
+    return partner.segment > segments_.frames.count
+               ? GST_CLOCK_TIME_NONE
+               : GST_BUFFER_PTS (partner.buffer.get ());
   };
   const auto own = [&] { return std::ranges::find (partners_, pts, time_of); };
   /* Of frames that are missing. */
@@ -190,31 +220,34 @@ PartnerInput::take (
     return !gst_pad_is_linked (pad_) || own () != partners_.end () ||
            partners_.size () >= kMost ||
            std::ranges::any_of (partners_,
-               [&] (const Partner &one) { return time_of (one) > pts; }) ||
-           has_ended_ || is_flushing_ || !may_wait_;
+               [&] (const Waiting &one) { return time_of (one) > pts; }) ||
+           segments_.is_ahead () || has_ended_ || is_flushing_ || !may_wait_;
   };
   while (!is_stalled_ && !moved_.wait_for (lock, kPatience, is_settled))
     is_stalled_ = frames_queued (lock, element) >= kQueued && !is_settled ();
   const auto found = own ();
+  if (found == partners_.end () && (!may_wait_ || is_flushing_))
+    return GST_FLOW_FLUSHING;
   if (found == partners_.end ())
-    return may_wait_ && !is_flushing_;
+    return segments_.is_ahead () ? kBrokenOff : GST_FLOW_OK;
   to = std::move (*found);
   partners_.erase (partners_.begin (), std::next (found));
   moved_.notify_all ();
-  return true;
+  return GST_FLOW_OK;
 }
 
-bool
+GstFlowReturn
 PartnerInput::attach (
     GstElement *element, GstBuffer *frame, bool wanted, bool encoded)
 {
   want (wanted);
   if (!wanted)
-    return true;
+    return GST_FLOW_OK;
   const GstClockTime pts = GST_BUFFER_PTS (frame);
   std::optional<Partner> partner;
-  if (!take (element, pts, partner))
-    return false;
+  if (const GstFlowReturn flow = take (element, pts, partner);
+      flow != GST_FLOW_OK)
+    return flow;
   GstBuffer *buffer = partner ? partner->buffer.get () : nullptr;
   const bool is_missing =
       !buffer || GST_BUFFER_FLAG_IS_SET (buffer, GST_BUFFER_FLAG_GAP);
@@ -225,7 +258,7 @@ PartnerInput::attach (
       is_of_use    ? nullptr
       : is_missing ? "missing"
                    : "damaged");
-  return true;
+  return GST_FLOW_OK;
 }
 
 void

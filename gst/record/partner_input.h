@@ -12,6 +12,7 @@
 
 #include "common/alone.h"
 #include "common/partner.h"
+#include "segment.h"
 
 namespace codedexposure::gst
 {
@@ -46,11 +47,15 @@ public:
    * frames that are @p encoded, to be recorded again with them.
    * @p wanted: the setup says that frames have partners; if not, those that
    * come are dropped: other files may have further tracks, too.
-   * False: a flush or a stop began, and the frame goes no further. */
-  bool attach (
+   * @return GST_FLOW_OK; else the frame goes no further: GST_FLOW_FLUSHING: a
+   * flush or a stop began; kBrokenOff: a seek left it without its partner. */
+  GstFlowReturn attach (
       GstElement *element, GstBuffer *frame, bool wanted, bool encoded);
+  static constexpr GstFlowReturn kBrokenOff = GST_FLOW_CUSTOM_SUCCESS;
+  /** The frames reach @p segment; partners before it are forgotten. */
+  void next_segment (GstEvent *segment);
   /** After a flush. */
-  void forget () { alone_.forget (); }
+  void forget ();
   /** No frame of @p element follows. Waits for the end of the partners: what is
    * said of them is said before the end of the stream. */
   void end (GstElement *element);
@@ -67,15 +72,20 @@ private:
       std::unique_lock<std::mutex> &lock, gpointer element) const;
   void want (bool wanted);
   /** That with the time @p pts, if there is one; those before it are dropped.
-   * False: a flush or a stop began before it came. */
-  bool take (GstElement *element, GstClockTime pts, std::optional<Partner> &to);
+   * As attach (). */
+  GstFlowReturn take (
+      GstElement *element, GstClockTime pts, std::optional<Partner> &to);
 
   GstPad *pad_ = nullptr;
   AloneFrames alone_;
 
   std::mutex lock_;               ///< of the rest; never held while pushing
   std::condition_variable moved_; ///< any of it
-  std::deque<Partner> partners_;
+  struct Waiting : Partner {
+    guint64 segment; ///< its number
+  };
+  std::deque<Waiting> partners_;
+  SegmentsBeside segments_;
   CapsPtr caps_;
   bool may_wait_ = true;     ///< let_wait ()
   bool is_flushing_ = false; ///< the pad is flushed, or not active

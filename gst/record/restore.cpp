@@ -5,7 +5,6 @@
  * next one comes if its line is not there yet. The pad `partner` takes the
  * frames of the second camera from another such part. */
 #include <algorithm>
-#include <deque>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -19,11 +18,8 @@
 #include "common/meta.h"
 #include "common/record.h"
 #include "common/tag.h"
-#include "damage.h"
-#include "partner_input.h"
 #include "parts.h"
-#include "segment.h"
-#include "track_sink.h"
+#include "restore_state.h"
 
 using namespace codedexposure;
 using namespace codedexposure::gst;
@@ -33,41 +29,6 @@ GST_DEBUG_CATEGORY (codedexposure_restore_debug);
 
 namespace
 {
-
-/** A frame, or a serialised event that came after one that waits. */
-using Item = std::variant<BufferPtr, EventPtr>;
-
-/** What is forgotten before a run. Stream lock of the sink pad. */
-struct Run {
-  GstVideoInfo info = {};
-  bool encoded = false; ///< there are no pixels to be checked
-  GstSegment segment = {};
-  std::deque<Item> held;
-  guint32 segment_seqnum = GST_SEQNUM_INVALID; ///< of the segment
-  bool is_complete = true;                     ///< all its frames are to come
-  std::optional<StreamSetup> container;     ///< setup of the container's tags
-  std::vector<StreamSetup> others;          ///< those before it
-  std::shared_ptr<const StreamSetup> setup; ///< in force
-  std::optional<guint64> last_frame;        ///< the largest number
-  GstClockTime last_pts = 0;                ///< of the newest frame
-  bool announced = false; ///< the container's tags say that there is a track
-  bool found_line = false;
-  /** No seek: the first frame is that of the stream, the last one its last. */
-  bool whole = true;
-  bool said_no_track = false;
-  bool said_moved = false;
-  bool said_setups_differ = false;
-};
-
-struct RestoreState : Run {
-  explicit RestoreState (GstElement *element = nullptr) : damage (element) {}
-
-  GstPad *sink = nullptr, *src = nullptr; ///< the element's
-  guint64 tick = 1; ///< object lock; to which the container rounds times, ns
-  TrackSink track;
-  PartnerInput partners;
-  DamageReport damage;
-};
 
 struct GstCodedExposureRestore : Instance<GstElement, RestoreState> {
 };
@@ -321,6 +282,7 @@ forget_frames (RestoreState &state)
   state.held.clear ();
   state.last_frame.reset ();
   state.damage.forget ();
+  state.track.forget ();
   state.partners.forget ();
   gst_segment_init (&state.segment, GST_FORMAT_TIME);
 }
@@ -336,8 +298,8 @@ take_segment (Self *self, EventPtr event)
   state.segment_seqnum = gst_event_get_seqnum (event.get ());
   const auto order = order_of (state.segment);
   state.is_complete = order == TrackReader::Order::all;
-  state.track.read (
-      [order] (TrackReader &reader) { reader.next_segment (order); });
+  state.track.next_segment (event.get (), order);
+  state.partners.next_segment (event.get ());
   if (!state.track.is_linked () || tick < 2)
     return event;
   include_rounding (state.segment, tick);
@@ -401,9 +363,10 @@ push_frame (Self *self, BufferPtr frame, const TrackReader::Match &match)
     keep_in_segment (state, time, GST_BUFFER_PTS (frame.get ()));
   } else
     mark_unknown (state, frame.get ());
-  if (!state.partners.attach (GST_ELEMENT (self), frame.get (),
-          state.setup && state.setup->partner, state.encoded))
-    return GST_FLOW_FLUSHING;
+  const GstFlowReturn flow = state.partners.attach (GST_ELEMENT (self),
+      frame.get (), state.setup && state.setup->partner, state.encoded);
+  if (flow != GST_FLOW_OK)
+    return flow == PartnerInput::kBrokenOff ? GST_FLOW_OK : flow;
   if (GST_BUFFER_PTS_IS_VALID (frame.get ()))
     state.segment.position = GST_BUFFER_PTS (frame.get ());
   if (GST_BUFFER_DURATION_IS_VALID (frame.get ()))
@@ -461,6 +424,26 @@ chain (GstPad *, GstObject *parent, GstBuffer *buffer) noexcept
   return release (self, false);
 }
 
+/* All lines that stand before @next in the file have come. A frame that still
+ * waits for its own was the last one that a seek let through. Returns it if the
+ * seek was to where it is: then the demuxer goes on behind it. */
+BufferPtr
+leave_segment (Self *self, const GstSegment &next)
+{
+  std::deque<Item> &held = self->state.held;
+  BufferPtr last;
+  do {
+    release (self, false);
+    if (held.empty () || !std::holds_alternative<BufferPtr> (held.front ()))
+      continue;
+    last = std::get<BufferPtr> (std::move (held.front ()));
+    held.pop_front ();
+  } while (!held.empty ());
+  if (last && (next.rate < 0 || GST_BUFFER_PTS (last.get ()) != next.start))
+    last.reset ();
+  return last;
+}
+
 gboolean
 sink_event (GstPad *pad, GstObject *parent, GstEvent *owned) noexcept
 {
@@ -481,6 +464,13 @@ sink_event (GstPad *pad, GstObject *parent, GstEvent *owned) noexcept
   /* No line follows the end. */
   if (type == GST_EVENT_EOS)
     release (self, true);
+  if (type == GST_EVENT_SEGMENT) {
+    BufferPtr first = leave_segment (self, *segment_of (owned));
+    const gboolean is_taken = take_event (self, std::move (event));
+    if (first)
+      state.held.push_back (std::move (first));
+    return is_taken;
+  }
   if (state.held.empty ())
     return take_event (self, std::move (event));
   state.held.push_back (std::move (event));

@@ -33,6 +33,30 @@ include_rounding (GstSegment &segment, guint64 tick)
     segment.start -= std::min (tick / 2, segment.start - segment.time);
 }
 
+/** The segments of a pad. One that repeats the number of its seek only corrects
+ * the one before. */
+struct SegmentCount {
+  guint64 count = 0;
+  guint32 seqnum = GST_SEQNUM_INVALID;
+
+  void follow (GstEvent *segment)
+  {
+    count += gst_event_get_seqnum (segment) != seqnum ? 1 : 0;
+    seqnum = gst_event_get_seqnum (segment);
+  }
+};
+
+/** A pad whose segments are those of the frames, but are reached in another
+ * thread. Without a flush, a seek may break the one off at a frame whose line
+ * or partner is behind it in the file. */
+struct SegmentsBeside {
+  SegmentCount own, frames;
+
+  /** That both have reached. */
+  guint64 reached () const { return std::min (own.count, frames.count); }
+  bool is_ahead () const { return own.count > frames.count; }
+};
+
 inline EventPtr
 segment_event (const GstSegment &segment, guint32 seqnum)
 {

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "track_sink.h"
 
+#include <utility>
+
 GST_DEBUG_CATEGORY_EXTERN (codedexposure_restore_debug);
 #define GST_CAT_DEFAULT codedexposure_restore_debug
 
@@ -44,7 +46,7 @@ TrackSink::take_over (GstPad *pad)
 /* --------------------------------------------------- thread of the track -- */
 
 GstFlowReturn
-TrackSink::chain (GstPad *pad, GstObject *parent, GstBuffer *buffer) noexcept
+TrackSink::chain (GstPad *pad, GstObject *, GstBuffer *buffer) noexcept
 {
   TrackSink &self = sink_of (pad);
   const BufferPtr owned (buffer);
@@ -57,12 +59,11 @@ TrackSink::chain (GstPad *pad, GstObject *parent, GstBuffer *buffer) noexcept
   const auto time_of = [] (GstClockTime time) {
     return GST_CLOCK_TIME_IS_VALID (time) ? Nanoseconds (time) : 0;
   };
-  const auto added = self.add (text, time_of (GST_BUFFER_PTS (buffer)),
-      time_of (GST_BUFFER_DURATION (buffer)));
-  if (!added) {
-    GST_WARNING_OBJECT (parent, "%s", added.error ().message.c_str ());
-    ++self.damaged_;
-  }
+  const std::lock_guard lock (self.lock_);
+  self.add (
+      {self.segments_.own.count, self.markup_ ? unescape_markup (text) : text,
+          time_of (GST_BUFFER_PTS (buffer)),
+          time_of (GST_BUFFER_DURATION (buffer))});
   return GST_FLOW_OK;
 }
 
@@ -80,11 +81,16 @@ TrackSink::event (GstPad *pad, GstObject *, GstEvent *owned) noexcept
                        "pango-markup") == 0;
     break;
   }
+  case GST_EVENT_SEGMENT:
+    self.reach (self.segments_.own, event.get ());
+    break;
   case GST_EVENT_FLUSH_STOP:
     self.reader_.clear ();
+    self.later_.clear ();
+    self.segments_.own = {};
     break;
   case GST_EVENT_EOS:
-    self.reader_.end ();
+    self.add ({self.segments_.own.count, std::nullopt});
     break;
   default:
     break;
@@ -92,11 +98,34 @@ TrackSink::event (GstPad *pad, GstObject *, GstEvent *owned) noexcept
   return TRUE;
 }
 
-Result<void>
-TrackSink::add (const std::string &text, Nanoseconds pts, Nanoseconds duration)
+void
+TrackSink::add (Item item)
 {
-  const std::lock_guard lock (lock_);
-  return reader_.add (markup_ ? unescape_markup (text) : text, pts, duration);
+  if (item.segment > segments_.frames.count) {
+    if (later_.size () == TrackReader::kMaxLines)
+      later_.pop_front ();
+    later_.push_back (std::move (item));
+    return;
+  }
+  if (!item.text) {
+    reader_.end ();
+    return;
+  }
+  const auto added = reader_.add (*item.text, item.pts, item.duration);
+  if (added)
+    return;
+  GST_WARNING_OBJECT (pad_, "%s", added.error ().message.c_str ());
+  ++damaged_;
+}
+
+/* When both have reached a segment, nothing before it counts. */
+void
+TrackSink::reach (SegmentCount &which, GstEvent *segment)
+{
+  const guint64 before = segments_.reached ();
+  which.follow (segment);
+  if (segments_.reached () > before)
+    reader_.clear ();
 }
 
 /* -------------------------------------------------- thread of the frames -- */
@@ -107,6 +136,29 @@ TrackSink::restart ()
   damaged_ = 0;
   const std::lock_guard lock (lock_);
   reader_ = {};
+  segments_ = {};
+  later_.clear ();
+}
+
+void
+TrackSink::next_segment (GstEvent *segment, TrackReader::Order order)
+{
+  const std::lock_guard lock (lock_);
+  reach (segments_.frames, segment);
+  reader_.next_segment (order);
+  const guint64 current = segments_.frames.count;
+  while (!later_.empty () && later_.front ().segment <= current) {
+    Item item = std::move (later_.front ());
+    later_.pop_front ();
+    if (item.segment == current)
+      add (std::move (item));
+  }
+}
+
+void
+TrackSink::forget ()
+{
+  locked (lock_, [&] { return segments_.frames = {}; });
 }
 
 } // namespace codedexposure::gst

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <deque>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -11,6 +12,7 @@
 
 #include "common/raii.h"
 #include "record/track_reader.h"
+#include "segment.h"
 
 namespace codedexposure::gst
 {
@@ -37,6 +39,10 @@ public:
 
   /* Streaming thread of the frames: */
 
+  /** The frames reach @p segment; lines before it are forgotten. */
+  void next_segment (GstEvent *segment, TrackReader::Order order);
+  /** After a flush. */
+  void forget ();
   /** What @p use returns of the reader, to which no line comes meanwhile. Never
    * push inside. */
   template <typename Use>
@@ -59,15 +65,23 @@ private:
       GstPad *pad, GstObject *parent, GstBuffer *buffer) noexcept;
   static gboolean event (
       GstPad *pad, GstObject *parent, GstEvent *event) noexcept;
-  Result<void> add (
-      const std::string &text, Nanoseconds pts, Nanoseconds duration);
+  /** A line, or the end of the track. */
+  struct Item {
+    guint64 segment;
+    std::optional<std::string> text;
+    Nanoseconds pts = 0, duration = 0;
+  };
+  void add (Item item);
+  void reach (SegmentCount &which, GstEvent *segment);
 
   GstPad *pad_ = nullptr;
   std::atomic<guint64> damaged_ = 0;
 
-  std::mutex lock_;     ///< never held while pushing
-  TrackReader reader_;  ///< lock_
-  bool markup_ = false; ///< lock_; the text is escaped
+  std::mutex lock_; ///< of the rest; never held while pushing
+  TrackReader reader_;
+  SegmentsBeside segments_;
+  std::deque<Item> later_; ///< of segments that the frames have not reached
+  bool markup_ = false;    ///< the text is escaped
 };
 
 } // namespace codedexposure::gst

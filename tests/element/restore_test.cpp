@@ -249,13 +249,48 @@ TEST_F (Restore, FramesThatAreMissingWithTheirLinesAreSaid)
   EXPECT_FALSE (file.posted<FramesMissing> ());
 }
 
+GstEvent *
+segment_from (GstClockTime start, GstClockTime stream_time)
+{
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  segment.start = start;
+  segment.time = stream_time;
+  return gst_event_new_segment (&segment);
+}
+
+/* A demuxer was stopped between a frame and its line, and has read on before
+ * the frames get there. If it is sent to that frame, it goes on behind it. */
+TEST_F (Restore, ASeekWithoutAFlushLeavesTheFrameWhoseLineHasNotCome)
+{
+  Recording again;
+  push_line (0);
+  push_frame (0);
+  push_frame (2);
+  gst_harness_push_event (track.get (), segment_from (0, 0));
+  for (int i = 1; i < kFrames - 1; i++)
+    push_line (i);
+  EXPECT_FALSE (file.pull () && file.pull ()) << "the second one waits";
+  file.push_event (segment_from (0, 0));
+  for (int i = 1; i < kFrames; i++)
+    file.push (std::move (again.frames[std::size_t (i)]));
+  gst_harness_push_event (track.get (), segment_from (5 * kPeriod, 0));
+  file.push_event (segment_from (5 * kPeriod, 0));
+  push_line (5);
+  end ();
+  int next = 1;
+  while (const BufferPtr frame = file.pull ())
+    EXPECT_EQ (GST_BUFFER_PTS (frame.get ()), GstClockTime (next++) * kPeriod);
+  EXPECT_EQ (next, kFrames);
+  EXPECT_EQ (counted (file.element (), "frames-unknown"), 0u);
+  EXPECT_EQ (counted (file.element (), "frames-missing"), 0u);
+}
+
 TEST_F (Restore, AfterASeekTheFramesBeforeItAreNotMissed)
 {
   file.push_event (gst_event_new_flush_start ());
   file.push_event (gst_event_new_flush_stop (TRUE));
-  GstSegment segment;
-  gst_segment_init (&segment, GST_FORMAT_TIME);
-  file.push_event (gst_event_new_segment (&segment));
+  file.push_event (segment_from (0, 0));
   play (0, 0);
   EXPECT_FALSE (file.posted<StreamIncomplete> ());
 }
@@ -265,9 +300,7 @@ TEST_F (Restore, AFrameWhoseTimeTheFileRoundedUpStaysInTheSegment)
   g_object_set (file.element (), "tick", guint64 (1000), nullptr);
   constexpr GstClockTime kRounded = kPeriod + 400;
   GstSegment segment;
-  gst_segment_init (&segment, GST_FORMAT_TIME);
-  segment.start = segment.time = kRounded;
-  file.push_event (gst_event_new_segment (&segment));
+  file.push_event (segment_from (kRounded, kRounded));
   GST_BUFFER_PTS (recording.frames[1].get ()) = kRounded;
   play (0, 0);
   while (const EventPtr event = file.pull_event (GST_EVENT_SEGMENT))
@@ -287,10 +320,7 @@ TEST_F (Restore, AfterASeekTheTimeOfTheStreamIsTheSame)
   g_object_set (file.element (), "tick", guint64 (1000), nullptr);
   const auto time_of_second_frame = [this] (GstClockTime start) {
     GstSegment segment;
-    gst_segment_init (&segment, GST_FORMAT_TIME);
-    segment.start = start;
-    segment.time = start - kPeriod / 2;
-    file.push_event (gst_event_new_segment (&segment));
+    file.push_event (segment_from (start, start - kPeriod / 2));
     while (const EventPtr event = file.pull_event (GST_EVENT_SEGMENT))
       gst_event_copy_segment (event.get (), &segment);
     return gst_segment_to_stream_time (&segment, GST_FORMAT_TIME, 2 * kPeriod);
@@ -351,7 +381,8 @@ TEST_F (Restore, TheSecondLineHasTheScheduleAgain)
 
 TEST_F (Restore, MarkupIsUnescaped)
 {
-  gst_harness_set_src_caps_str (track.get (), "text/x-raw,format=pango-markup");
+  const CapsPtr caps (gst_caps_from_string ("text/x-raw,format=pango-markup"));
+  gst_harness_push_event (track.get (), gst_event_new_caps (caps.get ()));
   for (BufferPtr &line : recording.lines) {
     GstMapInfo map;
     gst_buffer_map (line.get (), &map, GST_MAP_READ);
@@ -371,10 +402,7 @@ TEST_F (Restore, MarkupIsUnescaped)
 TEST_F (Restore, ExactTimesStayAsTheyAre)
 {
   GstSegment segment;
-  gst_segment_init (&segment, GST_FORMAT_TIME);
-  segment.start = kPeriod;
-  segment.time = kPeriod / 2;
-  file.push_event (gst_event_new_segment (&segment));
+  file.push_event (segment_from (kPeriod, kPeriod / 2));
   const EventPtr event = file.pull_event (GST_EVENT_SEGMENT);
   const EventPtr last = file.pull_event (GST_EVENT_SEGMENT);
   gst_event_copy_segment (last ? last.get () : event.get (), &segment);

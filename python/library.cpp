@@ -68,26 +68,16 @@ without_gil (Call call)
   return call ();
 }
 
-Method
-method_named (const std::string &name)
+/* One of the values up to @last, whose names are @names. */
+template <typename Value>
+Value
+named (const std::string &name, std::string_view (*name_of) (Value), Value last,
+    const std::string &what, const std::string &names)
 {
-  for (const Method method :
-      {Method::kAuto, Method::kRank, Method::kSelect, Method::kDecode})
-    if (method_name (method) == name)
-      return method;
-  throw py::value_error (
-      "method '" + name + "' is not auto, rank, select or decode");
-}
-
-FuseQuality
-quality_named (const std::string &name)
-{
-  for (const FuseQuality quality : {FuseQuality::kFast, FuseQuality::kBalanced,
-           FuseQuality::kBest, FuseQuality::kLearned})
-    if (quality_name (quality) == name)
-      return quality;
-  throw py::value_error (
-      "quality '" + name + "' is not fast, balanced, best or learned");
+  for (int i = 0; i <= int (last); i++)
+    if (name_of (Value (i)) == name)
+      return Value (i);
+  throw py::value_error (what + " '" + name + "' is not " + names);
 }
 
 template <typename Pixel>
@@ -96,7 +86,8 @@ make_extractor (const std::string &schedule, int width, int height,
     const std::string &method, int bits)
 {
   ExtractOptions options;
-  options.method = method_named (method);
+  options.method = named (method, method_name, Method::kDecode, "method",
+      "auto, rank, select or decode");
   options.bits = bits;
   return unwrap (Extractor<Pixel>::make (
       unwrap (Schedule::parse (schedule)), width, height, options));
@@ -119,7 +110,8 @@ make_fuser (const std::string &schedule, int width, int height,
     double read_noise)
 {
   FuseOptions options;
-  options.quality = quality_named (quality);
+  options.quality = named (quality, quality_name, FuseQuality::kLearned,
+      "quality", "fast, balanced, best or learned");
   options.bits = bits;
   options.lookahead = lookahead;
   options.noise.full_well = full_well;

@@ -123,6 +123,17 @@ install_state (gpointer klass)
   install_properties<Table, state_in<Self>, Changed> (G_OBJECT_CLASS (klass));
 }
 
+/** Changed of install_state () where a schedule without a text is the default
+ * one. */
+template <typename Self>
+void
+want_schedule (GObject *object, const GParamSpec *)
+{
+  auto &settings = state_in<Self> (object).settings;
+  if (settings.schedule.text.empty ())
+    settings.schedule = decltype (Self::state.settings) ().schedule;
+}
+
 /** What an element does when its state changes; null: nothing. */
 struct StateHooks {
   using Try = bool (*) (

@@ -135,20 +135,12 @@ properties ()
   };
 }
 
-void
-changed (GObject *object, const GParamSpec *)
-{
-  auto &schedule = state (object).settings.schedule;
-  if (schedule.text.empty ())
-    schedule = Settings ().schedule;
-}
-
 } // namespace
 
 void
 install_own_state (gpointer klass)
 {
-  install_state<GstDmdSync, properties, changed> (klass);
+  install_state<GstDmdSync, properties, want_schedule<GstDmdSync>> (klass);
   static const auto set = G_OBJECT_CLASS (klass)->set_property;
   G_OBJECT_CLASS (klass)->set_property = [] (GObject *object, guint id,
                                              const GValue *value,

@@ -98,20 +98,13 @@ properties ()
   };
 }
 
-void
-changed (GObject *object, const GParamSpec *)
-{
-  Settings &settings = state (object).settings;
-  if (settings.schedule.text.empty ())
-    settings.schedule = Settings ().schedule;
-}
-
 } // namespace
 
 void
 install_own_state (gpointer klass)
 {
-  install_state<GstCodedExposureSim, properties, changed> (klass);
+  install_state<GstCodedExposureSim, properties,
+      want_schedule<GstCodedExposureSim>> (klass);
 }
 
 } // namespace codedexposure::gst::sim

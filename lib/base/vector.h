@@ -70,6 +70,12 @@ pick (V a, V b, Index, std::integer_sequence<int, I...>)
   return __builtin_shufflevector (a, b, Index::at (I)...);
 }
 
+/** Every second lane of two vectors in a row, from lane First on. */
+template <int First>
+struct EverySecond {
+  static constexpr int at (int lane) { return 2 * lane + First; }
+};
+
 /** The lanes, each moved down by By places, those at the end to the start. */
 template <int Lanes, int By>
 struct Rotate {

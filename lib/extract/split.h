@@ -10,12 +10,6 @@
 namespace codedexposure::CODEDEXPOSURE_TARGET
 {
 
-/** Every second lane of two vectors, from lane First on. */
-template <int First>
-struct EverySecond {
-  static constexpr int at (int lane) { return 2 * lane + First; }
-};
-
 /* Width vectors in a row hold pixel x of cell i at position i Width + x. For an
  * odd width the lanes that belong to one x are blended from all vectors, where
  * they already stand in lanes that differ, and put in order by one permutation

@@ -13,12 +13,6 @@ constexpr int kFloats = kLanes<float>;
 
 using Ints = Vector<std::int32_t>;
 
-/* Every second lane of two vectors in a row. */
-template <int First>
-struct EverySecond {
-  static constexpr int at (int lane) { return 2 * lane + First; }
-};
-
 /* Each lane of the lower half twice. */
 struct Twice {
   static constexpr int at (int lane) { return lane / 2; }

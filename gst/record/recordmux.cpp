@@ -298,7 +298,8 @@ on_input (GstPad *, GstPadProbeInfo *info, gpointer data) noexcept
   GstEvent *event = is_frame ? nullptr : GST_PAD_PROBE_INFO_EVENT (info);
   if (event && GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
     state.was_flushed = state.has_begun;
-  else if (!event || GST_EVENT_IS_SERIALIZED (event))
+  else if (!event || gst_event_type_get_flags (GST_EVENT_TYPE (event)) &
+                         GST_EVENT_TYPE_SERIALIZED)
     if (std::exchange (state.was_flushed, false))
       begin_anew (self);
   if (event && GST_EVENT_TYPE (event) == GST_EVENT_CAPS)

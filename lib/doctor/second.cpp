@@ -352,8 +352,9 @@ SecondRun::measure_light ()
       bright.mean, [&] (int x, int y) { full += bright.full.at (x, y) > 0; });
   const double pixels = double (bright.mean.width ()) * bright.mean.height ();
   finding_.measure ("second-bright", {100 * full / pixels, 0.0});
-  const auto light_of = [] (const Measured &on, const Measured &off) {
-    return Measured{on.value - off.value, std::hypot (on.sigma, off.sigma)};
+  const auto light_of = [] (const Measured &light, const Measured &dark) {
+    return Measured{
+        light.value - dark.value, std::hypot (light.sigma, dark.sigma)};
   };
   /* Dark pixels may all be rounded alike. */
   const auto rounded = [] (Measured dark) {

@@ -16,7 +16,8 @@ STOPPED = 130  # status of a command that was stopped
 CALL = 'codedexposure archive'
 HELP = f'''Usage: {CALL} plan|submit RECORDING... --to FOLDER [option...]
            [-- DECODE OPTION...]
-       {CALL} status|resume|verify|clean FOLDER
+       {CALL} status|verify|clean FOLDER
+       {CALL} resume FOLDER [--hosts FILE]
        {CALL} pack RECORDING... [option...]
 Decodes many recordings on many cores or computers. They are cut into chunks,
 which Slurm or GNU parallel decodes, and put together: for each recording, byte
@@ -26,7 +27,7 @@ with recordings.
   plan     what would be done, in core hours and bytes, by a measured minute
   submit   start; with GNU parallel it also waits for the end
   status   progress, rate, time left, and why chunks failed
-  resume   start again what is missing
+  resume   start again what is missing, also on other --hosts
   verify   read all again: each coded frame's pictures are there exactly once
   clean    remove the chunks of recordings that are merged
   pack     turn raw recordings into FFV1, each in its place, as pack does
@@ -99,7 +100,8 @@ DECODES = {**RUNS, '--to': {},
            '--chunk': {'type': number, 'default': 1500}}
 # The options of each command.
 COMMANDS = {'plan': {**DECODES, '--no-measure': FLAG}, 'submit': DECODES,
-            'pack': RUNS, 'status': {}, 'resume': {}, 'verify': {}, 'clean': {}}
+            'pack': RUNS, 'status': {}, 'resume': {'--hosts': {}}, 'verify': {},
+            'clean': {}}
 
 
 def parse():
@@ -181,6 +183,7 @@ def submit(options):
                 if os.path.lexists(path.rstrip('/')):
                     raise Problem(f'{path} exists; choose another folder, or set '
                                   '--force to replace it')
+    chunk.check_decodes(made)
     store.create()
     with store.lock('run'):
         refuse_second(store)  # submitted meanwhile
@@ -197,10 +200,16 @@ def refuse_second(store):
                       'choose another folder')
 
 
+def hosts_of(options):
+    """The file that names computers, or None. Raises Problem if it does not."""
+    if options.hosts:
+        engine.read_hosts(options.hosts)
+    return options.hosts and os.path.abspath(options.hosts)
+
+
 def engine_of(options):
     settings = {'on': engine.choose(options.on), 'jobs': options.jobs,
-                'tasks': options.tasks,
-                'hosts': options.hosts and os.path.abspath(options.hosts)}
+                'tasks': options.tasks, 'hosts': hosts_of(options)}
     settings.update((name, getattr(options, name)) for name in engine.PASSED)
     return settings
 
@@ -211,8 +220,11 @@ def pack(options):
                        options.threads)
 
 
-def resume(store, made):
+def resume(store, made, options):
     with store.lock('run'):
+        if options.hosts:
+            made.engine['hosts'] = hosts_of(options)
+            write_json(store.plan, made.to_json())
         run = store.last_run()
         jobs = read_json(os.path.join(run, 'jobs.json')) if run else None
         if engine.running_jobs(jobs):
@@ -359,8 +371,9 @@ def main():
     made = plan.Plan.from_json(read_json(store.plan))
     if options.command == 'status':
         return 0 if status.show(store, made) else 1
-    return {'resume': resume, 'verify': verify, 'clean': clean}[options.command](
-        store, made)
+    if options.command == 'resume':
+        return resume(store, made, options)
+    return {'verify': verify, 'clean': clean}[options.command](store, made)
 
 
 SAID_BY = 'decode' if OF_DECODE else NAME

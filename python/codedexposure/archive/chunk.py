@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Decodes one chunk."""
 import contextlib
+import copy
 import json
 import os
+import re
 import resource
 import shutil
 import socket
 import subprocess
+import tempfile
 import time
 
 from . import programs
-from .plan import FORMS, digest_of_options
+from .plan import FORMS, borders_of, digest_of_options
 from .store import (Problem, digest, fingerprint, read_json, write_json)
 
 TABLE = 'statistics.csv'
@@ -83,6 +86,29 @@ def check_options(plan):
         check=False, stdin=subprocess.DEVNULL)
     if said.returncode != 0:
         raise Problem(said.stderr.partition('\n')[0])
+
+
+def check_decodes(plan):
+    """Raises Problem if the options of the plan do not fit the first recording that
+    is not damaged, which only decoding tells. One coded frame is decoded; if that
+    fails, another, since the first may be damaged."""
+    first = next((r for r in plan.recordings if r.frames and not r.whole), None)
+    if not (first and plan.options):
+        return
+    said = programs.info([first.path])[0]
+    part, each = copy.copy(plan), copy.copy(first)
+    part.recordings = [each]
+    each.borders = borders_of(said['times_ns'], said['start_ns'], 1)
+    for frame in 0, first.frames // 2:
+        with tempfile.TemporaryDirectory() as folder:
+            log = os.path.join(folder, 'log')
+            programs.run(command(part, 0, frame, folder), log)
+            # This computer may lack the memory to decode, which others have.
+            unfit = [line for line in programs.last_lines(log, 50)
+                     if re.search('error: (demux|fuse|pair): ', line)]
+        if not unfit:
+            return
+    raise Problem(f'{first.path} cannot be decoded with these options: {unfit[0]}')
 
 
 def join_command(plan, videos, output):

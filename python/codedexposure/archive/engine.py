@@ -153,12 +153,22 @@ def at_hosts(engine):
     return words
 
 
+def read_hosts(path):
+    """The computers that a file of --hosts names."""
+    try:
+        with open(path, encoding='utf-8') as file:
+            hosts = [line.strip() for line in file]
+    except (OSError, ValueError) as error:
+        raise Problem(f'cannot read --hosts {path}: '
+                      f'{getattr(error, "strerror", "it is no text")}; name a file '
+                      'with a line for each computer') from error
+    return [host for host in hosts if host and not host.startswith('#')]
+
+
 def check_hosts(store, plan):
     """Raises Problem if a computer would mix results, or none answers; prints
     which do not."""
-    with open(plan.engine['hosts'], encoding='utf-8') as file:
-        hosts = [line.strip() for line in file]
-    hosts = [host for host in hosts if host and not host.startswith('#')]
+    hosts = read_hosts(plan.engine['hosts'])
     said = subprocess.run(
         ['parallel', '--will-cite', '--nonall', '--tag', *at_hosts(plan.engine),
          shlex.join([*programs.ARCHIVE, 'work', 'host', store.folder,

@@ -108,6 +108,8 @@ private:
       json["simulated"] = info.setup->simulated;
       json["bench_profile"] = info.setup->bench.has_value ();
       json["mapping"] = info.setup->mapping.has_value ();
+      if (info.setup->off_beam)
+        json["beam"] = "off";
     }
     if (times_)
       json["times_ns"] = info.times;

@@ -105,10 +105,11 @@ def add_seconds(recordings, second):
             recording.whole = 'its second recording is cut off or damaged'
 
 
-def find_recordings(words, lists, avoid):
+def find_recordings(words, lists, avoid, seconds=True):
     """(what info says of it, name of its output without an ending) of each.
     Folders are searched for recordings, but not below the folder @avoid; what is
-    none there is named and left out."""
+    none there is named and left out. Without @seconds, those of second cameras are
+    none."""
     for name in lists:
         try:
             with open(name, encoding='utf-8') as file:
@@ -133,6 +134,11 @@ def find_recordings(words, lists, avoid):
                     searched.append((os.path.abspath(path), stem))
     known = programs.info([path for path, _ in found + searched])
     named, found = len(found), found + searched
+    for said in known:
+        if said.get('beam') == 'off' and not seconds:
+            said['error'] = (f'{said["recording"]} is the recording of a second '
+                             'camera; name that of the first camera, and set '
+                             '--second FILE after -- to fuse this one with it')
     for said in known[named:]:
         if 'schedule' not in said:
             said.setdefault('error', f'{said["recording"]} says no schedule: it '
@@ -295,7 +301,9 @@ def make(words, lists, folder, form, length, threads, options, program):
     """The plan of an archive in @folder."""
     options, second = take_second(check_options(options))
     recordings, outputs = [], {}
-    for said, stem in find_recordings(words, lists, os.path.abspath(folder)):
+    # Decoding one by itself needs its schedule.
+    alone = not second and any(o.startswith('--schedule=') for o in options)
+    for said, stem in find_recordings(words, lists, os.path.abspath(folder), alone):
         output, path = stem + FORMS[form], said['recording']
         if output in outputs:
             raise Problem(f'{path} and {outputs[output]} would both become '

@@ -6,6 +6,7 @@ import builtins
 import json
 import os
 import re
+import stat
 from collections.abc import Iterator
 from contextlib import closing
 from fractions import Fraction
@@ -165,6 +166,9 @@ class Recording:
     # ---------------------------------------------------------------- file --
 
     def _check(self) -> None:
+        # To open a pipe may wait for ever.
+        if not stat.S_ISREG(os.stat(self.path).st_mode):
+            raise OSError(f"cannot read {self.path}; give the name of a recording")
         with builtins.open(self.path, "rb") as file:
             head = file.read(100000)
         if head[:4] != b"\x1a\x45\xdf\xa3":

@@ -3,6 +3,7 @@
 """The Python package gives what codedexposure decode writes, and says what is lost."""
 import csv
 import json
+import os
 import re
 import unittest
 import warnings
@@ -285,6 +286,10 @@ class Faults(unittest.TestCase):
     def test_no_recording(self):
         with self.assertRaises(FileNotFoundError):
             opened("missing.mkv")
+        os.mkfifo(SCRATCH / "pipe.mkv")
+        for name in "pipe.mkv", ".":
+            with self.assertRaisesRegex(OSError, "cannot read .*; give the name of"):
+                opened(name)
         (SCRATCH / "text.mkv").write_text("no video")
         with self.assertRaisesRegex(codedexposure.Error, "not a Matroska file"):
             opened("text.mkv")

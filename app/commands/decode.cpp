@@ -39,7 +39,7 @@ private:
   Chain read (Job &job) const;
   void build (Job &job);
   void build_search (Job &job) const;
-  RunResult play_once (bool salvage, bool &found);
+  RunResult play_once (bool salvage, bool is_cut_short);
   [[noreturn]] void decode_on_cores () const;
 
   const Options *declared_ = nullptr;
@@ -312,10 +312,12 @@ Decode::build_search (Job &job) const
 }
 
 RunResult
-Decode::play_once (bool salvage, bool &found)
+Decode::play_once (bool salvage, bool is_cut_short)
 {
   Job job ("decode", run_);
   job.salvage = salvage;
+  job.is_cut_short = is_cut_short;
+  bool found = !find_phase_;
   if (find_phase_)
     build_search (job);
   else
@@ -324,6 +326,9 @@ Decode::play_once (bool salvage, bool &found)
     g_object_set (job.reader, "threads", guint (*threads_), nullptr);
   job.on_message = [&found] (const GstStructure *message) {
     found |= gst_structure_has_name (message, "moirecalib/phase");
+  };
+  job.judge = [&found] (const RunResult &run) {
+    return run.exit == Exit::done && !found ? Exit::failed : run.exit;
   };
   return play (job);
 }
@@ -370,20 +375,18 @@ Decode::run ()
   if (jobs_.value_or (1) > 1)
     decode_on_cores ();
   Status status ("decode", false);
-  bool found = false;
-  RunResult result = play_once (false, found);
+  RunResult result = play_once (false, info.is_cut_short);
   if (run_.print)
     return result.exit;
   if (result.container_damaged) {
     status.line (recording_ + " is damaged between its frames; reading it from "
                               "front to back");
-    result = play_once (true, found);
+    result = play_once (true, info.is_cut_short);
   }
   if ((info.is_cut_short || info.is_open) && result.exit == Exit::failed &&
       result.frames == 0)
-    fail (recording_ + " is cut off and has no complete frame to decode");
-  if (info.is_cut_short && result.exit == Exit::done)
-    result.exit = Exit::damaged;
+    status.line (
+        recording_ + " is cut off and has no complete frame to decode");
   if (result.exit == Exit::damaged)
     status.line (
         recording_ + (second_ ? " or " + *second_ : "") +
@@ -394,8 +397,6 @@ Decode::run ()
         ".mp4 has no place for the flags of " + std::to_string (unflagged_) +
         " pictures of damaged or unsynchronised frames; add "
         "--statistics FILE.csv, which lists them, or use another form");
-  if (find_phase_ && result.exit == Exit::done && !found && !run_.print)
-    return Exit::failed;
   return result.exit;
 }
 

@@ -81,7 +81,7 @@ Guide::Guide (Job &job, GstElement *calib, GstElement *stage)
   job.ends_by_signal = true;
   job.on_message = [this] (
                        const GstStructure *message) { on_element (message); };
-  job.judge = [this] (bool interrupted) { return judge (interrupted); };
+  job.judge = [this] (const RunResult &run) { return judge (run.interrupted); };
   const auto on_key = [] (gint, GIOCondition, gpointer self) {
     return static_cast<Guide *> (self)->take_key ();
   };

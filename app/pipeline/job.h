@@ -43,6 +43,14 @@ public:
   virtual void finish () = 0;
 };
 
+/** How a run ended. */
+struct RunResult {
+  Exit exit = Exit::failed;
+  gint64 frames = 0;
+  bool container_damaged = false; ///< read it again with salvage
+  bool interrupted = false;
+};
+
 /** What the functions that build a pipeline say of it. */
 struct Job {
   explicit Job (std::string command_name, const RunOptions &run_options)
@@ -75,6 +83,8 @@ struct Job {
   GstElement *reader = nullptr;
   /** The file of the reader was finished, and is as long as it was then. */
   bool is_finished = false;
+  /** Frames may be missing at its end, which the others do not show. */
+  bool is_cut_short = false;
   /** The recording is read from front to back, past damage. */
   bool salvage = false;
   /** The queues before encoder and disk of live recordings. */
@@ -100,19 +110,11 @@ struct Job {
   bool has_result = true;
   /** Called with each element message, on the main thread. */
   std::function<void (const GstStructure *)> on_message;
-  /** How the run ended, if its frames do not say it. */
-  std::function<Exit (bool interrupted)> judge;
+  /** How the run ended, by how its frames ended it; null: as they did. */
+  std::function<Exit (const RunResult &)> judge;
   std::unique_ptr<Viewer> window;
   /** An error of an element that is shown in a window ends the run well. */
   bool has_window = false;
-};
-
-/** How a run ended. */
-struct RunResult {
-  Exit exit = Exit::failed;
-  gint64 frames = 0;
-  bool container_damaged = false; ///< read it again with salvage
-  bool interrupted = false;
 };
 
 /** Plays @p job until its end and publishes its outputs; prints progress,

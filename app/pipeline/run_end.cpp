@@ -84,6 +84,7 @@ Run::finish ()
                       ? Exit::nobody
                       : Exit::failed;
   } else if (result.exit == Exit::done) {
+    damaged_ |= job_.is_cut_short;
     if (interrupted_ && !job_.ends_by_signal)
       result.exit = Exit::interrupted;
     else if (damaged_ || lost > 0)
@@ -94,7 +95,7 @@ Run::finish ()
     result.exit = Exit::nobody;
   }
   if (job_.judge)
-    result.exit = job_.judge (interrupted_);
+    result.exit = job_.judge (result);
   if (!published || (recording_ && recording_->is_removed ()))
     result.exit = Exit::failed;
   const std::string wrote = job_.outputs.summary (guint64 (frames ()));

@@ -2,6 +2,8 @@
 /* The end of a run: what was written, what is said of it, and its status. */
 #include "run.h"
 
+#include <algorithm>
+
 #include <nlohmann/json.hpp>
 
 namespace codedexposure::app
@@ -72,6 +74,7 @@ Run::finish ()
     lost_ = counter_of (job_.counted, "frames-lost");
   }
   const guint64 lost = counters_of (job_.recorders, "frames-lost");
+  lost_ = std::max (lost_, lost);
   const bool published = publish ();
   RunResult result{exit_, frames (), container_damaged_, interrupted_};
   if (container_damaged_)

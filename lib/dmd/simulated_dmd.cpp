@@ -36,14 +36,16 @@ SimulatedMirrors::program (const Schedule &schedule)
   stop ();
   const std::lock_guard guard (lock_);
   schedule_ = schedule;
+  slots_ = schedule.slots ();
   hold_.reset ();
 }
 
 void
-SimulatedMirrors::hold (StillMask mask)
+SimulatedMirrors::hold (StillMask mask, int slots)
 {
   stop ();
   const std::lock_guard guard (lock_);
+  slots_ = slots;
   hold_ = std::make_shared<const StillMask> (std::move (mask));
 }
 
@@ -132,17 +134,16 @@ SimulatedMirrors::View::mask_in_slot (std::int64_t slot)
 std::optional<int>
 SimulatedMirrors::decide (std::int64_t slot)
 {
-  if (!schedule_)
+  if (slots_ == 0)
     return std::nullopt;
-  if (slot % schedule_->slots () == 0)
+  if (slot % slots_ == 0)
     begin_exposure ();
   for (; !slips_.empty () && slips_.front ().slot <= slot; slips_.pop_front ())
     offset_ += slips_.front ().by;
   if (motion_ != Motion::stepping)
     return std::nullopt;
   if (held_)
-    return held_->in_slot (int (slot % schedule_->slots ())) ? kStillMask
-                                                             : kOffMask;
+    return held_->in_slot (int (slot % slots_)) ? kStillMask : kOffMask;
 
   const std::int64_t masks = schedule_->masks ();
   const std::int64_t mask = (slot - offset_) % masks;
@@ -214,15 +215,15 @@ public:
     return {};
   }
 
-  Result<void> show (
-      const StillMask &mask, const SlotPlan &, std::stop_token stop) override
+  Result<void> show (const StillMask &mask, const SlotPlan &plan,
+      std::stop_token stop) override
   {
-    if (!mirrors_->schedule ())
-      return Error{options_.info.name + ": no masks; upload first"};
+    if (!options_.info.still_masks)
+      return Dmd::show (mask, plan, stop);
     if (!send_mask (stop))
       return Error{options_.info.name + ": sending " + mask.name + " cancelled",
           ErrorCode::cancelled};
-    mirrors_->hold (mask);
+    mirrors_->hold (mask, plan.slots ());
     mirrors_->start ();
     return {};
   }

@@ -33,8 +33,9 @@ public:
 
   /** Parks the mirrors and takes the masks of @p schedule. */
   void program (const Schedule &schedule);
-  /** Takes one static mask, until the next program (). */
-  void hold (StillMask mask);
+  /** Takes one static mask, until the next program (). @p slots  of an
+   * exposure. */
+  void hold (StillMask mask, int slots);
   void start ();
   void stop ();
   bool running () const
@@ -129,6 +130,7 @@ private:
 
   mutable std::mutex lock_; // covers everything below; a leaf lock
   std::optional<Schedule> schedule_;
+  int slots_ = 0; // of an exposure; 0: there are no masks
   Shape shape_;
   std::shared_ptr<const StillMask> hold_, held_; // from now on; since it began
   Motion motion_ = Motion::parked;

@@ -91,7 +91,7 @@ TEST (SimulatedMirrors, AreSeenAlikeByTwoCameras)
   EXPECT_EQ (masks (*on, 0, 4), (std::vector{-1, -1, -1, -1}));
   mirrors->start ();
   EXPECT_EQ (masks (*on, 4, 4), (std::vector{0, 1, 2, 3}));
-  mirrors->hold ({.name = "all", .on = [] (int, int) { return true; }});
+  mirrors->hold ({.name = "all", .on = [] (int, int) { return true; }}, 4);
   mirrors->start ();
   const auto change = masks (*on, 8, 4);
   EXPECT_EQ (change, (std::vector{-1, -1, -1, -1}));
@@ -224,6 +224,30 @@ TEST_F (SimulatedDmd, CannotStartWithoutMasks)
 {
   const auto dmd = *open_dmd ("sim:empty");
   EXPECT_FALSE (dmd->start (plan_of (Schedule ())));
+}
+
+TEST_F (SimulatedDmd, ShowsOneMaskWithoutTheOthers)
+{
+  const auto dmd = open_dmd ("sim:alone");
+  ASSERT_TRUE (dmd);
+  const auto mirrors = SimulatedMirrors::find ("alone");
+  const StillMask first{
+      .name = "first", .on = [] (int, int) { return true; }, .slots = 2};
+  ASSERT_TRUE ((*dmd)->show (first, plan_of (Schedule ()), {}));
+  EXPECT_EQ (masks_shown (*mirrors, 0, 4),
+      (std::vector{kStillMask, kStillMask, kOffMask, kOffMask}));
+  EXPECT_FALSE ((*dmd)->start (plan_of (Schedule ()), {}));
+}
+
+TEST_F (SimulatedDmd, TakesNoMaskIfItIsToldSo)
+{
+  const auto dmd = open_dmd ("sim:fixed,still=no");
+  ASSERT_TRUE (dmd);
+  const auto shown =
+      (*dmd)->show ({.name = "all", .on = [] (int, int) { return true; }},
+          plan_of (Schedule ()), {});
+  ASSERT_FALSE (shown);
+  EXPECT_EQ (shown.error ().code, ErrorCode::unsupported);
 }
 
 TEST_F (SimulatedDmd, FailsWhereItIsAskedTo)

@@ -61,15 +61,33 @@ Graph::add (const char *factory, const Settings &settings)
   return element;
 }
 
+namespace
+{
+
+/* Null: @error, which may be null, says why. */
+GstElement *
+parse (const std::string &description, GError **error)
+{
+  return gst_parse_bin_from_description_full (description.c_str (), TRUE,
+      nullptr,
+      GstParseFlags (
+          GST_PARSE_FLAG_FATAL_ERRORS | GST_PARSE_FLAG_NO_SINGLE_ELEMENT_BINS),
+      error);
+}
+
+} // namespace
+
+/* The parser takes caps between two elements only, and not at the end. */
 GstElement *
 Graph::add_text (const std::string &description)
 {
   GError *error = nullptr;
-  GstElement *bin = gst_parse_bin_from_description_full (description.c_str (),
-      TRUE, nullptr,
-      GstParseFlags (
-          GST_PARSE_FLAG_FATAL_ERRORS | GST_PARSE_FLAG_NO_SINGLE_ELEMENT_BINS),
-      &error);
+  std::string text = description;
+  GstElement *bin = parse (description, &error);
+  if (!bin) {
+    text += " ! identity";
+    bin = parse (text, nullptr);
+  }
   if (!bin) {
     const std::string why = error ? error->message : "it is empty";
     g_clear_error (&error);
@@ -79,7 +97,7 @@ Graph::add_text (const std::string &description)
   g_clear_error (&error);
   gst_bin_add (GST_BIN (pipeline ()), bin);
   g_object_set_data_full (
-      G_OBJECT (bin), "description", g_strdup (description.c_str ()), g_free);
+      G_OBJECT (bin), "description", g_strdup (text.c_str ()), g_free);
   return bin;
 }
 

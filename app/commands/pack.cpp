@@ -79,7 +79,8 @@ private:
   std::optional<int> threads_;
   RunOptions run_;
   Status status_{"pack", false};
-  int lock_ = -1; // open and locked until the program ends
+  std::optional<Signals> signals_; // from the first pass to the last
+  int lock_ = -1;                  // open and locked until the program ends
 };
 
 CommandText
@@ -164,6 +165,7 @@ Pack::look_through (const std::string &file)
   for (bool salvage = false;; salvage = true) {
     Job job ("pack", run_);
     job.options.print = job.options.json = job.has_result = false;
+    job.signals = &*signals_;
     job.salvage = salvage;
     Chain chain = read_recording (job, file);
     chain.to ("fakesink", {{"sync", false}});
@@ -171,7 +173,7 @@ Pack::look_through (const std::string &file)
     std::vector<std::string> lines;
     log_frames (chain.last (), lines);
     const RunResult result = play (job);
-    if (!result.container_damaged || salvage)
+    if (!result.container_damaged || result.interrupted || salvage)
       return {result, std::move (lines)};
   }
 }
@@ -181,6 +183,7 @@ Pack::encode (const std::string &recording, const std::string &to, bool salvage)
 {
   Job job ("pack", run_);
   job.options.json = job.has_result = false;
+  job.signals = &*signals_;
   job.salvage = salvage;
   Chain chain = read_recording (job, recording);
   chain.queue (8);
@@ -218,6 +221,7 @@ Pack::give_up (Part &part, const std::string &why, Exit exit)
 Exit
 Pack::run ()
 {
+  signals_.emplace ();
   start_gstreamer ();
   const RecordingInfo info = value_of (recording_info (recording_));
   std::error_code ignored;

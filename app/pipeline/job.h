@@ -14,6 +14,7 @@
 #include "pipeline/frame_counter.h"
 #include "pipeline/graph.h"
 #include "pipeline/outputs.h"
+#include "pipeline/signals.h"
 
 namespace codedexposure::app
 {
@@ -102,6 +103,8 @@ struct Job {
   bool waits_for_receiver = false;
   /** Reads from a server: for how long to try to connect, s. */
   std::optional<double> retry;
+  /** Of a command that runs more than this; null: they are those of the run. */
+  Signals *signals = nullptr;
   /** Ctrl-C is the usual end, and not an interruption. */
   bool ends_by_signal = false;
   /** A person moves in the frames: they are not counted, and end at once. */

@@ -6,8 +6,6 @@
 #include <csignal>
 #include <utility>
 
-#include <glib-unix.h>
-
 #include "common/messages.h"
 #include "record/matroska.h"
 
@@ -18,14 +16,6 @@ using namespace gst;
 
 namespace
 {
-
-bool
-is_ignored (int signal)
-{
-  struct sigaction action = {};
-  return sigaction (signal, nullptr, &action) == 0 &&
-         action.sa_handler == SIG_IGN;
-}
 
 void
 end_at_sources (GstElement *element, gpointer)
@@ -54,14 +44,6 @@ Run::~Run ()
   g_main_loop_unref (loop_);
 }
 
-gboolean
-Run::on_unix_signal (gpointer data)
-{
-  auto *signal = static_cast<Signal *> (data);
-  signal->run->on_signal (++signal->times);
-  return G_SOURCE_CONTINUE;
-}
-
 bool
 Run::claim_outputs ()
 {
@@ -84,19 +66,15 @@ Run::run_loop ()
   gst_bus_add_watch (bus.get (), on_bus, this);
   /* The reader of the messages may be gone. */
   std::signal (SIGPIPE, SIG_IGN);
-  Signal signals[] = {{this, SIGINT}, {this, SIGTERM}, {this, SIGHUP}};
-  std::vector<guint> sources;
-  for (Signal &signal : signals)
-    if (signal.number != SIGHUP || !is_ignored (SIGHUP)) // nohup
-      sources.push_back (
-          g_unix_signal_add (signal.number, on_unix_signal, &signal));
+  std::optional<Signals> own;
+  Signals &signals = job_.signals ? *job_.signals : own.emplace ();
+  signals.tell ([this] (int times) { on_signal (times); });
   const bool claimed = claim_outputs ();
   if (claimed) {
     begin ();
     g_main_loop_run (loop_);
   }
-  for (const guint source : sources)
-    g_source_remove (source);
+  signals.tell (nullptr);
   gst_bus_remove_watch (bus.get ());
   return claimed;
 }

@@ -64,15 +64,6 @@ private:
   std::string flaws () const;
   gint64 frames () const { return counter_ ? counter_->frames ().load () : 0; }
 
-  /* Only the same signal again is another one: what starts this program may
-   * pass on one that a terminal has sent to both. */
-  struct Signal {
-    Run *run;
-    int number;
-    int times = 0;
-  };
-  static gboolean on_unix_signal (gpointer signal);
-
   Job &job_;
   GMainLoop *loop_;
   Status status_;

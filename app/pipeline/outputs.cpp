@@ -80,6 +80,11 @@ public:
   }
   Result<void> publish () override { return part_.publish (replace_); }
   void discard () override { part_.discard (); }
+  void recount () override
+  {
+    if (const auto written = recording_info (part_.path ()); pad_ && written)
+      frames_ = written->times.size ();
+  }
   bool has_content () const override
   {
     return (!pad_ || frames_ > 0) && !part_.is_empty ();
@@ -256,8 +261,11 @@ Outputs::name_elements (bool replace)
 }
 
 std::vector<std::string>
-Outputs::finish (Finish how)
+Outputs::finish (Finish how, bool failed)
 {
+  if (failed)
+    for (const auto &output : outputs_)
+      output->recount ();
   bool only_sidecars = true, have_frames = false;
   for (const auto &output : outputs_) {
     only_sidecars &= output->is_sidecar ();

@@ -35,6 +35,8 @@ public:
   virtual Result<void> finished () const { return {}; }
   /** After that: gives the frames their name. */
   virtual Result<void> publish () = 0;
+  /** After an error: frames that came may not be in the file. */
+  virtual void recount () {}
   /** Removes what was written. */
   virtual void discard () = 0;
   /** Whether there are frames to publish. */
@@ -104,8 +106,9 @@ public:
     keep,    ///< those with frames stay beside their names, as .part
     discard,
   };
-  /** After the pipeline has stopped. Errors: what could not be published. */
-  std::vector<std::string> finish (Finish how);
+  /** After the pipeline has stopped, because it has @p failed or not. Errors:
+   * what could not be published. */
+  std::vector<std::string> finish (Finish how, bool failed = false);
   /** After finish (): "coded.mkv and fast.mkv (100 frames)", the outputs that
    * are there; with their frames if they are not @p usual. Empty: none. */
   std::string summary (std::optional<guint64> usual) const;

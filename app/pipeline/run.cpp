@@ -248,6 +248,7 @@ Run::end_after_error (GstObject *failed)
   constexpr guint kPatience = 5; // s
   if (std::exchange (failed_, true))
     return;
+  flaws_before_error_ = flaws ();
   if (!playing_ || job_.outputs.empty () || !set_playing ()) {
     end (Exit::failed);
     return;

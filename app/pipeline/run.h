@@ -84,8 +84,9 @@ private:
   bool silent_ = false;  // no frame came for a while, and that was said
   bool interrupted_ = false;
   bool failed_ = false; // the stream ends because of an error
-  guint patience_ = 0;  // source that then ends it without its end; 0: none
-  bool damaged_;        // frames are missing or damaged
+  std::string flaws_before_error_;
+  guint patience_ = 0; // source that then ends it without its end; 0: none
+  bool damaged_;       // frames are missing or damaged
   bool container_damaged_ = false;
   guint64 not_coded_ = 0, lost_ = 0; // coded frames
   std::string noticed_;              // the last notice

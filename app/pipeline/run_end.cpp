@@ -45,7 +45,8 @@ Run::publish ()
   const auto how = container_damaged_             ? Outputs::Finish::discard
                    : whole || job_.ends_by_signal ? Outputs::Finish::publish
                                                   : Outputs::Finish::keep;
-  const auto errors = job_.outputs.finish (how);
+  const bool failed = failed_ || (recording_ && recording_->is_removed ());
+  const auto errors = job_.outputs.finish (how, failed);
   for (const std::string &error : errors)
     status_.line ("error: " + error);
   return errors.empty ();
@@ -68,7 +69,7 @@ Run::finish ()
 {
   if (job_.options.verbose && frames () > 0)
     print_counters ();
-  const std::string flaws = this->flaws ();
+  const std::string flaws = failed_ ? flaws_before_error_ : this->flaws ();
   if (job_.counted) {
     not_coded_ = counter_of (job_.counted, "frames-not-coded");
     lost_ = counter_of (job_.counted, "frames-lost");

@@ -225,8 +225,7 @@ def resume(store, made, options):
         if options.hosts:
             made.engine['hosts'] = hosts_of(options)
             write_json(store.plan, made.to_json())
-        run = store.last_run()
-        jobs = read_json(os.path.join(run, 'jobs.json')) if run else None
+        jobs = store.last_jobs()
         if engine.running_jobs(jobs):
             raise Problem(f'jobs {", ".join(jobs)} still run; wait for their end, '
                           f'or end them: scancel {" ".join(jobs)}')
@@ -369,6 +368,7 @@ def main():
     if not store.exists():
         raise Problem(f'{store.folder} is no archive; submit makes one')
     made = plan.Plan.from_json(read_json(store.plan))
+    store.create()  # folders that someone removed
     if options.command == 'status':
         return 0 if status.show(store, made) else 1
     if options.command == 'resume':

@@ -20,6 +20,7 @@ TABLE = 'statistics.csv'
 FOR_OUTPUT = '--deflate', '--white'  # for other forms than lossless video
 DONE, DAMAGED = 0, 3  # of decode
 COUNTED = 'frames', 'not_coded', 'lost', 'pictures'  # by decode
+NUMBERS = *COUNTED, 'status', 'seconds', 'cpu_seconds'  # of a manifest
 ENGINE_NAMES = 'SLURM_ARRAY_JOB_ID', 'SLURM_ARRAY_TASK_ID', 'PARALLEL_SEQ'
 
 
@@ -30,6 +31,13 @@ def seconds(time_ns):
 def name_of(form):
     """The file or folder with the pictures of a chunk."""
     return 'pictures' + FORMS[form].rstrip('/')
+
+
+def outputs_of(plan, recording, pictures):
+    """The names of what a chunk with so many pictures has. All its frames may show
+    a pattern, so that there is none."""
+    names = [name_of(plan.chunk_form(recording)), *[TABLE] * plan.statistics]
+    return names if pictures else []
 
 
 def second_of(source):
@@ -154,7 +162,6 @@ def decode(plan, recording, chunk, scratch):
     if status not in (DONE, DAMAGED) or said is None:
         raise Problem(f'decode ended with status {status}')
     check_source(source)
-    names = [name_of(plan.chunk_form(recording)), *[TABLE] * plan.statistics]
     expected = source.frames_of(chunk, plan.length)
     # What is too damaged to be decoded is lost.
     found = said['frames'] + (said['lost'] if status == DAMAGED else 0)
@@ -162,10 +169,9 @@ def decode(plan, recording, chunk, scratch):
         raise Problem(f'decode read {found} of the {expected} coded frames of this '
                       'chunk')
     manifest = identity(plan, recording, chunk)
-    # All frames of a chunk may show a pattern, so that there is no picture.
     manifest.update(
         outputs={name: digest(os.path.join(scratch, name))
-                 for name in names if said['pictures']},
+                 for name in outputs_of(plan, recording, said['pictures'])},
         **{name: said[name] for name in COUNTED}, status=status,
         host=socket.gethostname(),
         begun=begun, seconds=time.time() - begun, cpu_seconds=cpu_seconds() - cpu,
@@ -208,12 +214,17 @@ def mismatch(store, plan, recording, chunk):
     manifest, if it is."""
     folder = store.part(recording, chunk)
     manifest = read_json(os.path.join(folder, 'manifest.json'))
-    if manifest is None:
+    if manifest is None or not all(
+            isinstance(manifest.get(name), (int, float)) for name in NUMBERS):
         return 'its manifest cannot be read', None
     for name, value in identity(plan, recording, chunk).items():
         if manifest.get(name) != value:
             return f'its {name} is not that of the plan', None
-    for name, said in manifest['outputs'].items():
+    outputs, names = manifest.get('outputs'), outputs_of(
+        plan, recording, manifest['pictures'])
+    if not isinstance(outputs, dict) or set(outputs) != set(names):
+        return 'its outputs are not those of the plan', None
+    for name, said in outputs.items():
         path = os.path.join(folder, name)
         if not os.path.exists(path) or digest(path) != said:
             return f'{name} is not what its manifest says', None

@@ -219,10 +219,32 @@ def run(store, plan, recording, others_may=False):
     return True
 
 
+def manifest_of(store, plan, recording):
+    """Of a merged recording. Raises Problem if there is none, or it was damaged."""
+    path = store.merged(recording)
+    if not store.is_merged(recording):
+        raise Problem(f'{plan.recordings[recording].path} is not merged; see status')
+    said = read_json(path)
+    try:
+        numbers = [said['status'], *(said['counts'][name] for name in (
+            *chunks.COUNTED, 'coded')), *(h['bytes'] for h in said['output_hashes'])]
+        is_whole = all(isinstance(number, int) for number in numbers) and \
+            len(said['output_hashes']) == len(plan.outputs(recording))
+    except (KeyError, TypeError):
+        is_whole = False
+    if not is_whole:
+        raise Problem(f'{path} was changed or damaged; remove it and resume to merge '
+                      'the recording again')
+    return said
+
+
 def is_there(store, plan, recording):
     """Whether all that was merged is there, by its size."""
-    said = read_json(store.merged(recording))
-    return said is not None and all(
+    try:
+        said = manifest_of(store, plan, recording)
+    except Problem:
+        return False
+    return all(
         os.path.exists(path) and size_of(path) == hashed['bytes']
         for path, hashed in zip(outputs_of(store, plan, recording),
                                 said['output_hashes']))
@@ -232,18 +254,19 @@ def verify(store, plan, recording):
     """Raises Problem unless the output is what was merged, and holds the pictures
     of every coded frame of the recording exactly once. The manifest."""
     source = plan.recordings[recording]
-    said = read_json(store.merged(recording))
-    if said is None:
-        raise Problem(f'{source.path} is not merged; see status')
+    said = manifest_of(store, plan, recording)
     for path, digested in zip(outputs_of(store, plan, recording),
                               said['output_hashes']):
         if not os.path.exists(path) or digest(path) != digested:
             raise Problem(f'{path} is not what was merged; remove '
                           f'{store.merged(recording)} and resume to merge it '
                           'again')
-    frames, counts = programs.info([source.path])[0].get('frames'), said['counts']
+    now, counts = programs.info([source.path])[0], said['counts']
+    if 'error' in now:
+        raise Problem(now['error'])
+    frames = now['frames']
     found = counts['frames'] + (counts['lost'] if said['status'] else 0)
-    if frames is None or found < frames:
+    if found < frames:
         raise Problem(f'{source.path} has {frames} coded frames, but {found} were '
                       'decoded')
     return said

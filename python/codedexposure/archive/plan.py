@@ -18,6 +18,13 @@ FORMS = {'mkv': '.mkv', 'png': '/', 'mp4': '.mp4', 'ome.tif': '.ome.tif',
          'h5': '.h5'}
 
 
+def has_types(thing):
+    """Whether the fields of a dataclass have the types that it says."""
+    return all(isinstance(getattr(thing, field.name),
+                          (int, float) if field.type is float else field.type)
+               for field in dataclasses.fields(thing))
+
+
 @dataclasses.dataclass
 class Recording:
     path: str
@@ -234,9 +241,24 @@ class Plan:
         fields['recordings'] = [vars(r) for r in self.recordings]
         return fields
 
+    def is_valid(self):
+        """What was read from a file may be anything."""
+        return (
+            has_types(self) and self.recordings and self.form in FORMS
+            and min(self.length, self.threads) > 0
+            and all(has_types(r) and all(isinstance(b, int) for b in r.borders)
+                    for r in self.recordings)
+            and all(isinstance(option, str) for option in self.options)
+            and self.engine.get('on') in ('slurm', 'parallel')
+            and all(value is None or isinstance(
+                value, int if name in ('jobs', 'tasks') else str)
+                for name, value in self.engine.items()))
+
     @staticmethod
     def from_json(fields):
-        unreadable = Problem('the plan of this archive cannot be read')
+        unreadable = Problem(
+            'the plan of this archive, .archive/plan.json, was changed or damaged; '
+            'put it back, or submit to a new folder')
         if not fields or fields.get('format') != FORMAT:
             raise unreadable
         if fields.get('version') != VERSION:
@@ -246,9 +268,12 @@ class Plan:
             'format', 'version')}
         try:
             fields['recordings'] = [Recording(**r) for r in fields['recordings']]
-            return Plan(**fields)
+            made = Plan(**fields)
         except (KeyError, TypeError) as error:
             raise unreadable from error
+        if not made.is_valid():
+            raise unreadable
+        return made
 
 
 def beside(output, ending):

@@ -2,6 +2,7 @@
 """What is done, what failed, and how long the rest will take."""
 import dataclasses
 import os
+import re
 import shutil
 import sys
 import time
@@ -11,6 +12,7 @@ from .store import Busy, read_json
 
 BAR = 30
 SHOWN = 5  # failures
+FAILURE = re.compile(r'(\d+)-(merge|\d+)\.json')
 RESUME = 'resume goes on with what is missing'
 
 
@@ -38,11 +40,12 @@ def take(store, plan):
             done[number] = store.done(number)
             status.chunks += len(done[number])
     for name in sorted(os.listdir(os.path.join(store.work, 'failed'))):
-        recording, _, chunk = name.removesuffix('.json').partition('-')
-        if not name.endswith('.json') or int(recording) not in done:
+        found = FAILURE.fullmatch(name)
+        if not found or int(found[1]) not in done:
             continue
-        if chunk == 'merge' or int(chunk) not in done[int(recording)]:
-            status.failed.append((int(recording), chunk, name))
+        recording, chunk = int(found[1]), found[2]
+        if chunk == 'merge' or int(chunk) not in done[recording]:
+            status.failed.append((recording, chunk, name))
     return status
 
 
@@ -60,20 +63,24 @@ def progress(store, status):
             f'{status.of_merged} recordings merged')
     run = store.last_run()
     begun = read_json(os.path.join(run, 'begun.json')) if run else None
+    chunks, at = (begun or {}).get('chunks'), (begun or {}).get('time')
     left = status.of_chunks - status.chunks
-    if begun and left and begun['chunks'] > left:
-        rate = (begun['chunks'] - left) / max(time.time() - begun['time'], 1e-3)
+    if left and isinstance(chunks, int) and isinstance(at, float) and chunks > left:
+        rate = (chunks - left) / max(time.time() - at, 1e-3)
         text += f', {60 * rate:.3g} chunks/min, {duration(left / rate)} left'
     return text
 
 
 def show_failures(store, plan, status, out=sys.stdout):
     for recording, chunk, name in status.failed[:SHOWN]:
-        said = read_json(os.path.join(store.work, 'failed', name)) or {}
+        # A full disk takes no record.
+        said = read_json(os.path.join(store.work, 'failed', name)) or {
+            'error': 'there is no record why', 'host': 'an unknown computer'}
         what = 'merging' if chunk == 'merge' else f'chunk {int(chunk)} of'
         print(f'failed: {what} {plan.recordings[recording].path}: '
               f'{said.get("error")} (on {said.get("host")})', file=out)
-        for line in said.get('lines', []):
+        lines = said.get('lines')
+        for line in lines if isinstance(lines, list) else []:
             print(f'  {line}', file=out)
     if len(status.failed) > SHOWN:
         print(f'and {len(status.failed) - SHOWN} more failures, in '
@@ -99,9 +106,7 @@ def show(store, plan):
     """Whether everything is merged."""
     status = take(store, plan)
     print(progress(store, status))
-    run = store.last_run()
-    jobs = read_json(os.path.join(run, 'jobs.json')) if run else None
-    states = engine.running_jobs(jobs)
+    states = engine.running_jobs(store.last_jobs())
     if states:
         print('in the queue of Slurm: ' + ', '.join(
             f'{count} {state}' for state, count in sorted(states.items())))

@@ -41,13 +41,14 @@ def write_json(path, content):
     os.replace(part, path)
 
 
-def read_json(path):
+def read_json(path, kind=dict):
     """None: there is no such file, or it is damaged."""
     try:
         with open(path, encoding='utf-8') as file:
-            return json.load(file)
+            content = json.load(file)
     except (OSError, ValueError):
         return None
+    return content if isinstance(content, kind) else None
 
 
 def sync(path):
@@ -149,6 +150,11 @@ class Store:
         runs = os.path.join(self.work, 'runs')
         numbers = [name for name in os.listdir(runs) if name.isdigit()]
         return os.path.join(runs, max(numbers)) if numbers else None
+
+    def last_jobs(self):
+        """Those of the last run on Slurm."""
+        path = os.path.join(self.last_run() or self.work, 'jobs.json')
+        return [str(job) for job in read_json(path, list) or []]
 
     def done(self, recording):
         """The chunks of a recording that are complete, by the names of their

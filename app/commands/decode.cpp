@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "command.h"
+#include "common/messages.h"
 #include "common/meta.h"
 #include "options/picture.h"
 #include "pipeline/decoder.h"
@@ -317,18 +318,20 @@ Decode::play_once (bool salvage, bool is_cut_short)
   Job job ("decode", run_);
   job.salvage = salvage;
   job.is_cut_short = is_cut_short;
-  bool found = !find_phase_;
   if (find_phase_)
     build_search (job);
   else
     build (job);
   if (threads_)
     g_object_set (job.reader, "threads", guint (*threads_), nullptr);
-  job.on_message = [&found] (const GstStructure *message) {
-    found |= gst_structure_has_name (message, "moirecalib/phase");
+  job.on_message = [&job] (const GstStructure *message) {
+    if (const auto phase = gst::from_structure<gst::MoirePhase> (message))
+      job.schedule = phase->schedule;
   };
-  job.judge = [&found] (const RunResult &run) {
-    return run.exit == Exit::done && !found ? Exit::failed : run.exit;
+  job.judge = [this, &job] (const RunResult &run) {
+    return run.exit == Exit::done && find_phase_ && job.schedule.empty ()
+               ? Exit::failed
+               : run.exit;
   };
   return play (job);
 }

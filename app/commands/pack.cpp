@@ -9,6 +9,8 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include <nlohmann/json.hpp>
+
 #include "base/part.h"
 #include "command.h"
 #include "common/partner.h"
@@ -71,6 +73,8 @@ private:
   RunResult encode (
       const std::string &recording, const std::string &to, bool salvage);
   void publish (Part &part, const std::string &recording, std::size_t frames);
+  Exit end (Exit exit, std::size_t frames,
+      const std::vector<std::string> &outputs = {}) const;
   [[noreturn]] void give_up (
       Part &part, const std::string &why, Exit exit = Exit::failed);
 
@@ -211,6 +215,16 @@ Pack::publish (Part &part, const std::string &recording, std::size_t frames)
       format (", %.0f %% of the raw size, all checked", 100 * size / raw));
 }
 
+Exit
+Pack::end (Exit exit, std::size_t frames,
+    const std::vector<std::string> &outputs) const
+{
+  if (run_.json)
+    print_json ({{"command", "pack"}, {"source", recording_},
+        {"frames", frames}, {"outputs", outputs}, {"status", int (exit)}});
+  return exit;
+}
+
 void
 Pack::give_up (Part &part, const std::string &why, Exit exit)
 {
@@ -232,7 +246,7 @@ Pack::run ()
     if (output_)
       fail (recording + " is FFV1 already; copy it");
     status_.line (recording + " is FFV1 already");
-    return Exit::done;
+    return end (Exit::done, info.times.size ());
   }
   if (run_.print) {
     if (!output_)
@@ -254,7 +268,7 @@ Pack::run ()
   if (!before.is_sound () && !output_ && !run_.force) {
     status_.line (recording + " is cut off or damaged, and stays as it is; set "
                               "--output or --force to pack what can be read");
-    return Exit::damaged;
+    return end (Exit::damaged, before.lines.size ());
   }
   const fs::path whole = fs::absolute (output, ignored);
   Part part (output, Part::kFile,
@@ -275,7 +289,8 @@ Pack::run ()
   if (!before.is_sound ())
     status_.line (recording + " is cut off or damaged; what could be read was "
                               "packed, and damaged frames stay damaged");
-  return before.is_sound () ? Exit::done : Exit::damaged;
+  return end (before.is_sound () ? Exit::done : Exit::damaged,
+      before.lines.size (), {part.name ()});
 }
 
 } // namespace

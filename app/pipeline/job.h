@@ -26,8 +26,12 @@ public:
   struct Calls {
     GstElement *pipeline = nullptr;
     std::function<void ()> end; ///< as Ctrl-C does
-    /** A file was written, or could not be. */
-    std::function<void (const std::string &text, bool failed)> said;
+    /** Files were written, of which @p more is said, such as " (2.5 s)". */
+    std::function<void (
+        const std::vector<std::string> &files, const std::string &more)>
+        wrote;
+    /** Something could not be done. */
+    std::function<void (const std::string &why)> failed;
     /** Something has happened. */
     std::function<void (const std::string &text)> told;
   };
@@ -113,6 +117,8 @@ struct Job {
   bool has_result = true;
   /** Called with each element message, on the main thread. */
   std::function<void (const GstStructure *)> on_message;
+  /** That was found in the frames; empty: none. */
+  std::string schedule;
   /** How the run ended, by how its frames ended it; null: as they did. */
   std::function<Exit (const RunResult &)> judge;
   std::unique_ptr<Viewer> window;

@@ -6,6 +6,8 @@
 #include <csignal>
 #include <utility>
 
+#include <nlohmann/json.hpp>
+
 #include "common/messages.h"
 #include "record/matroska.h"
 
@@ -50,6 +52,8 @@ Run::claim_outputs ()
   const auto errors = job_.outputs.claim (job_.options.force);
   for (const std::string &error : errors)
     status_.line ("error: " + error);
+  if (!errors.empty () && job_.options.json)
+    app::print_json ({{"error", joined (errors)}}, 2);
   return errors.empty ();
 }
 
@@ -106,14 +110,21 @@ Run::prepare ()
 void
 Run::watch_window ()
 {
-  const auto said = [this] (const std::string &text, bool failed) {
-    if (failed)
-      status_.line ("error: " + text);
+  const auto wrote = [this] (const std::vector<std::string> &files,
+                         const std::string &more) {
+    wrote_.insert (wrote_.end (), files.begin (), files.end ());
+    const std::string text = "wrote " + joined (files) + more;
+    if (job_.options.json)
+      status_.line (text);
     else
-      status_.output ("wrote " + text);
+      status_.output (text);
+  };
+  const auto failed = [this] (const std::string &why) {
+    status_.line ("error: " + why);
   };
   const auto told = [this] (const std::string &text) { status_.line (text); };
-  job_.window->begin ({pipeline (), [this] { on_signal (1); }, said, told});
+  job_.window->begin (
+      {pipeline (), [this] { on_signal (1); }, wrote, failed, told});
 }
 
 RunResult

@@ -90,6 +90,7 @@ private:
   bool container_damaged_ = false;
   guint64 not_coded_ = 0, lost_ = 0; // coded frames
   std::string noticed_;              // the last notice
+  std::vector<std::string> wrote_;   // by the window
 };
 
 } // namespace codedexposure::app

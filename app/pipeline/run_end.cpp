@@ -140,12 +140,16 @@ Run::print_result (const std::string &flaws, const std::string &wrote)
 void
 Run::print_json (Exit exit, const std::string &flaws) const
 {
+  std::vector<std::string> outputs = job_.outputs.names ();
+  outputs.insert (outputs.end (), wrote_.begin (), wrote_.end ());
   nlohmann::ordered_json json = {{"command", job_.command},
       {"source", job_.source}, {"frames", frames ()}, {"not_coded", not_coded_},
       {"lost", lost_}, {"pictures", job_.outputs.frames ()},
-      {"flaws", flaws.empty () ? "" : flaws.substr (2)},
-      {"outputs", job_.outputs.names ()}, {"damaged", damaged_},
-      {"interrupted", interrupted_}, {"status", int (exit)}};
+      {"flaws", flaws.empty () ? "" : flaws.substr (2)}, {"outputs", outputs},
+      {"damaged", damaged_}, {"interrupted", interrupted_},
+      {"status", int (exit)}};
+  if (!job_.schedule.empty ())
+    json["schedule"] = job_.schedule;
   app::print_json (json);
 }
 

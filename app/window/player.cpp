@@ -59,10 +59,10 @@ Player::short_keys ()
 }
 
 void
-Player::begin (GstElement *pipeline, Said said)
+Player::begin (GstElement *pipeline, Failed failed)
 {
   pipeline_ = pipeline;
-  said_ = std::move (said);
+  failed_ = std::move (failed);
 }
 
 Player::State
@@ -232,7 +232,7 @@ Player::move ()
           GST_SEEK_TYPE_SET, from > 0 ? from + kInside : 0,
           ends ? GST_SEEK_TYPE_SET : GST_SEEK_TYPE_NONE, stop)) {
     is_moving_ = false;
-    said_ (played_.recording + " cannot be moved in", true);
+    failed_ (played_.recording + " cannot be moved in");
   }
 }
 
@@ -378,14 +378,14 @@ Player::export_stretch ()
 {
   const State now = state ();
   if (!now.from && !now.until) {
-    said_ ("nothing is marked; press A at the first coded frame of a stretch, "
-           "and B at the last one",
-        true);
+    failed_ (
+        "nothing is marked; press A at the first coded frame of a stretch, "
+        "and B at the last one");
     return;
   }
   if (exporting_) {
-    said_ (exported_ + " is still being written; press E again when it is done",
-        true);
+    failed_ (
+        exported_ + " is still being written; press E again when it is done");
     return;
   }
   std::vector<std::string> words = export_command (now);
@@ -397,7 +397,7 @@ Player::export_stretch ()
   GError *error = nullptr;
   if (!g_spawn_async (nullptr, arguments.data (), nullptr,
           G_SPAWN_DO_NOT_REAP_CHILD, nullptr, nullptr, &pid, &error)) {
-    said_ (std::string ("cannot export: ") + error->message, true);
+    failed_ (std::string ("cannot export: ") + error->message);
     g_error_free (error);
     return;
   }

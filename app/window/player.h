@@ -43,7 +43,7 @@ struct Played {
 class Player
 {
 public:
-  using Said = std::function<void (const std::string &text, bool failed)>;
+  using Failed = std::function<void (const std::string &why)>;
 
   explicit Player (Played played) : played_ (std::move (played)) {}
   /** Waits for what is being exported. */
@@ -58,7 +58,7 @@ public:
 
   /** Before @p pipeline plays. Main thread, as all but
    * is_paused (), is_wanted () and line (). */
-  void begin (GstElement *pipeline, Said said);
+  void begin (GstElement *pipeline, Failed failed);
   /** Whether the end of the stream, or what else @p message says, is dealt
    * with.
    */
@@ -114,7 +114,7 @@ private:
 
   const Played played_;
   GstElement *pipeline_ = nullptr;
-  Said said_;
+  Failed failed_;
   Place wanted_, target_;
   bool is_moving_ = false; ///< to target_
   bool has_stepped_ = false;

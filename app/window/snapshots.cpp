@@ -9,6 +9,7 @@
 #include <gst/video/video.h>
 
 #include "base/part.h"
+#include "base/try.h"
 #include "pipeline/messages.h"
 
 namespace codedexposure::app
@@ -98,23 +99,25 @@ save_as (const std::string &name, Save save)
 }
 
 /* Their names, which no other files had. */
-Result<std::string>
+Result<std::vector<std::string>>
 save (const Snapshot &snapshot)
 {
-  std::string stem = snapshot.name, names;
+  std::string stem = snapshot.name;
+  std::vector<std::string> names;
   std::error_code ignored;
   for (int k = 2; std::filesystem::exists (stem + ".png", ignored); k++)
     stem = format ("%s-%d", snapshot.name.c_str (), k);
   for (const auto &[what, picture] : snapshot.pictures) {
-    const auto name = save_as (stem + "-" + what + ".png",
-        [&] (Part &part) { return save_picture (*picture, part); });
-    if (!name)
-      return name;
-    names += *name + ", ";
+    ASSIGN_OR_RETURN (const std::string name,
+        save_as (stem + "-" + what + ".png",
+            [&] (Part &part) { return save_picture (*picture, part); }));
+    names.push_back (name);
   }
-  const auto name = save_as (
-      stem + ".png", [&] (Part &part) { return save_window (snapshot, part); });
-  return name ? Result<std::string> (names + *name) : name;
+  ASSIGN_OR_RETURN (const std::string name,
+      save_as (stem + ".png",
+          [&] (Part &part) { return save_window (snapshot, part); }));
+  names.push_back (name);
+  return names;
 }
 
 } // namespace
@@ -149,8 +152,10 @@ Snapshots::write ()
       next = std::move (taken_.front ());
       taken_.pop_front ();
     }
-    const Result<std::string> saved = save (next);
-    said_ (saved ? *saved : saved.error ().message, !saved);
+    if (const auto saved = save (next))
+      wrote_ (*saved);
+    else
+      failed_ (saved.error ().message);
   }
 }
 

@@ -32,22 +32,28 @@ struct Snapshot {
 class Snapshots
 {
 public:
-  using Said = std::function<void (const std::string &text, bool failed)>;
+  using Wrote = std::function<void (const std::vector<std::string> &files)>;
+  using Failed = std::function<void (const std::string &why)>;
 
   Snapshots () = default;
   ~Snapshots ();
   Snapshots (const Snapshots &) = delete;
   Snapshots &operator= (const Snapshots &) = delete;
 
-  /** The names of the files, that of the window last, or why they were not
-   * written, go to @p said. */
-  void begin (Said said) { said_ = std::move (said); }
+  /** The names of the files, that of the window last, go to @p wrote; why they
+   * were not written, to @p failed. */
+  void begin (Wrote wrote, Failed failed)
+  {
+    wrote_ = std::move (wrote);
+    failed_ = std::move (failed);
+  }
   void take (Snapshot snapshot);
   /** Writes those that were not yet written. */
   void write ();
 
 private:
-  Said said_; ///< constant while the pipeline plays
+  Wrote wrote_; ///< constant while the pipeline plays, as the next
+  Failed failed_;
   std::mutex mutex_;
   std::deque<Snapshot> taken_; ///< of the mutex
 };

@@ -93,9 +93,10 @@ void
 Window::begin (Calls calls)
 {
   calls_ = std::move (calls);
-  snapshots_.begin (calls_.said);
+  snapshots_.begin (
+      [this] (const auto &files) { calls_.wrote (files, ""); }, calls_.failed);
   if (setup_.player)
-    return setup_.player->begin (calls_.pipeline, calls_.said);
+    return setup_.player->begin (calls_.pipeline, calls_.failed);
   on_signal_ = g_unix_signal_add (
       SIGUSR1,
       [] (gpointer self) {

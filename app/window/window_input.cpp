@@ -82,14 +82,13 @@ Window::take_kept (GstMessage *message)
   if (GST_MESSAGE_SRC (message) != GST_OBJECT (setup_.keeper))
     return false;
   if (const auto kept = parse_message<Kept> (message))
-    calls_.said (format ("%s (%s, %.2f s)", kept->location.c_str (),
-                     coded_frames (kept->frames).c_str (),
-                     1e-9 * double (kept->duration)),
-        false);
+    calls_.wrote ({kept->location},
+        format (" (%s, %.2f s)", coded_frames (kept->frames).c_str (),
+            1e-9 * double (kept->duration)));
   else if (const auto event = parse_message<EventFound> (message))
     calls_.told (text_of (*event));
   else if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_WARNING)
-    calls_.said (Told (message).error->message, true);
+    calls_.failed (Told (message).error->message);
   else
     return false;
   return true;
@@ -308,7 +307,7 @@ Window::turn_camera (const std::string &key)
   if (turned)
     calls_.told (*turned);
   else
-    calls_.said (turned.error ().message, true);
+    calls_.failed (turned.error ().message);
 }
 
 void

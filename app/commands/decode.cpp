@@ -373,18 +373,19 @@ Decode::run ()
                  " has the frames of both cameras; leave out "
                  "--second " +
                  *second_);
+  bool is_cut_short = info.is_cut_short;
   if (second_)
-    value_of (recording_info (*second_, false));
+    is_cut_short |= value_of (recording_info (*second_, false)).is_cut_short;
   if (jobs_.value_or (1) > 1)
     decode_on_cores ();
   Status status ("decode", false);
-  RunResult result = play_once (false, info.is_cut_short);
+  RunResult result = play_once (false, is_cut_short);
   if (run_.print)
     return result.exit;
   if (result.container_damaged) {
     status.line (recording_ + " is damaged between its frames; reading it from "
                               "front to back");
-    result = play_once (true, info.is_cut_short);
+    result = play_once (true, is_cut_short);
   }
   if ((info.is_cut_short || info.is_open) && result.exit == Exit::failed &&
       result.frames == 0)

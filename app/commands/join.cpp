@@ -45,20 +45,24 @@ public:
   Part &operator= (const Part &) = delete;
 
   const std::string &name () const { return name_; }
-  /** Null at the end, and after an error. */
-  SamplePtr next () const
+  /** Null at the end, and after an error, which need not end the stream. */
+  SamplePtr next ()
   {
-    return SamplePtr (gst_app_sink_pull_sample (sink_));
+    constexpr GstClockTime kPatience = 100 * GST_MSECOND;
+    SamplePtr sample;
+    while (!sample && !gst_app_sink_is_eos (sink_) && !failure ())
+      sample.reset (gst_app_sink_try_pull_sample (sink_, kPatience));
+    return sample;
   }
   /** Why there are no more; none: that was the end. */
-  std::optional<std::string> failure () const
+  const std::optional<std::string> &failure ()
   {
     const ObjectPtr<GstBus> bus (gst_element_get_bus (job_.graph.pipeline ()));
     const std::unique_ptr<GstMessage, MiniObjectUnref> message (
         gst_bus_pop_filtered (bus.get (), GST_MESSAGE_ERROR));
-    if (!message)
-      return std::nullopt;
-    return Told (message.get ()).error->message;
+    if (message && !failure_)
+      failure_ = Told (message.get ()).error->message;
+    return failure_;
   }
   /** How the pictures were made, among others. */
   std::vector<EventPtr> tags () const
@@ -78,13 +82,14 @@ private:
   std::string name_;
   Job job_;
   GstAppSink *sink_;
+  std::optional<std::string> failure_;
 };
 
 /** Of all parts, about; NONE: not known. Files need it to choose their form. */
 GstClockTime
 duration_of (const std::vector<std::string> &names)
 {
-  const Part first (names.front (), false), last (names.back (), false);
+  Part first (names.front (), false), last (names.back (), false);
   const SamplePtr begin = first.next (), end = last.next ();
   if (!begin || !end)
     return GST_CLOCK_TIME_NONE;

@@ -98,8 +98,9 @@ struct RecordDemuxState {
   guint threads = 0;
 
   /* Of the bin: */
-  GstElement *file = nullptr;          ///< null: matroskademux is missing
-  GstPadChainFunction chain = nullptr; ///< of the demuxer
+  GstElement *file = nullptr;               ///< null: matroskademux is missing
+  GstPadChainFunction chain = nullptr;      ///< of the demuxer
+  GstPadEventFunction take_event = nullptr; ///< of the demuxer
 
   std::atomic<bool> has_new_frame = false;
 
@@ -266,15 +267,6 @@ on_bytes (GstPad *pad, GstPadProbeInfo *info, gpointer self) noexcept
 }
 
 GstPadProbeReturn
-on_segment (GstPad *, GstPadProbeInfo *info, gpointer self) noexcept
-{
-  GstEvent *event = GST_PAD_PROBE_INFO_EVENT (info);
-  if (GST_EVENT_TYPE (event) == GST_EVENT_SEGMENT)
-    state_in<Self> (self).stream.large.follow (*segment_of (event));
-  return GST_PAD_PROBE_OK;
-}
-
-GstPadProbeReturn
 on_frame (GstPad *, GstPadProbeInfo *, gpointer self) noexcept
 {
   state_in<Self> (self).has_new_frame = true;
@@ -313,6 +305,30 @@ through_gate (ClusterGate &gate, GstBuffer *buffer)
 
 /* A demuxer that has failed does not pass the end on, and its source would post
  * an error. */
+void
+end_frames (RecordDemuxState &state)
+{
+  const auto end = [] (GstElement *, GstPad *src, gpointer) {
+    gst_pad_push_event (src, gst_event_new_eos ());
+    return gboolean (TRUE);
+  };
+  gst_element_foreach_src_pad (state.file, end, nullptr);
+}
+
+gboolean
+take_event (GstPad *pad, GstObject *parent, GstEvent *event) noexcept
+{
+  const ObjectPtr<GstObject> self (gst_object_get_parent (parent));
+  auto &state = state_in<Self> (self.get ());
+  const bool is_end = GST_EVENT_TYPE (event) == GST_EVENT_EOS;
+  if (GST_EVENT_TYPE (event) == GST_EVENT_SEGMENT)
+    state.stream.large.follow (*segment_of (event));
+  const gboolean taken = state.take_event (pad, parent, event);
+  if (is_end && state.stream.has_failed)
+    end_frames (state);
+  return taken;
+}
+
 GstFlowReturn
 chain (GstPad *pad, GstObject *parent, GstBuffer *buffer) noexcept
 {
@@ -326,11 +342,7 @@ chain (GstPad *pad, GstObject *parent, GstBuffer *buffer) noexcept
       buffer ? state.chain (pad, parent, buffer) : GST_FLOW_OK;
   if (!state.stream.has_failed)
     return flow;
-  const auto end = [] (GstElement *, GstPad *src, gpointer) {
-    gst_pad_push_event (src, gst_event_new_eos ());
-    return gboolean (TRUE);
-  };
-  gst_element_foreach_src_pad (state.file, end, nullptr);
+  end_frames (state);
   return GST_FLOW_EOS;
 }
 
@@ -445,8 +457,8 @@ add_demuxer (Self *self)
       sink.get (), GST_PAD_PROBE_TYPE_QUERY_UPSTREAM, on_query, self, nullptr);
   gst_pad_add_probe (
       sink.get (), GST_PAD_PROBE_TYPE_BUFFER, on_bytes, self, nullptr);
-  gst_pad_add_probe (sink.get (), GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
-      on_segment, self, nullptr);
+  state.take_event = GST_PAD_EVENTFUNC (sink.get ());
+  gst_pad_set_event_function (sink.get (), take_event);
   state.chain = GST_PAD_CHAINFUNC (sink.get ());
   gst_pad_set_chain_function (sink.get (), chain);
 }

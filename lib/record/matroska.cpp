@@ -253,6 +253,7 @@ read_block (Source &file, const Element &part, Walk &walk, RecordingInfo &info)
 void
 read_blocks (Source &file, const Element &segment, RecordingInfo &info)
 {
+  const bool is_cut = segment.is_open || segment.end > file.size ();
   Walk walk;
   for (std::uint64_t at = segment.data;
        at < std::min (file.size (), segment.end);) {
@@ -263,14 +264,15 @@ read_blocks (Source &file, const Element &segment, RecordingInfo &info)
         part && (!part->is_open || holds) &&
         (is_one_of (kOfSegment, part->id) || is_one_of (kOfCluster, part->id) ||
             is_one_of (kOfGroup, part->id));
-    if (!is_known) {
-      info.is_damaged = true;
+    const std::uint64_t next = is_known && holds ? part->data
+                               : is_known        ? part->end
+                                                 : file.size () + 1;
+    if (next > file.size ()) {
       at = next_cluster (file, at + 1);
+      info.is_damaged |= at < file.size () || !is_cut;
       continue;
     }
-    at = holds ? part->data : part->end;
-    if (at > file.size ())
-      break;
+    at = next;
     if (part->id == kTimestamp)
       walk.cluster = file.number (*part);
     read_extras (file, *part, info);

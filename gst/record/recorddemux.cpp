@@ -84,6 +84,7 @@ struct Stream {
   bool has_failed = false; ///< and the rest is salvaged
   ClusterGate gate;        ///< of what is salvaged
   LargeFrames large;
+  bool is_discont = false; ///< the next bytes that the demuxer gets are
 };
 
 struct RecordDemuxState {
@@ -334,10 +335,16 @@ chain (GstPad *pad, GstObject *parent, GstBuffer *buffer) noexcept
 {
   const ObjectPtr<GstObject> self (gst_object_get_parent (parent));
   auto &state = state_in<Self> (self.get ());
+  state.stream.is_discont |= GST_BUFFER_IS_DISCONT (buffer);
   if (salvages (self.get ()))
     buffer = through_gate (state.stream.gate, buffer);
   if (buffer)
     buffer = state.stream.large.pushed (buffer);
+  /* Without it, a demuxer that runs again goes on with what it holds. */
+  if (buffer && std::exchange (state.stream.is_discont, false)) {
+    buffer = gst_buffer_make_writable (buffer);
+    GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DISCONT);
+  }
   const GstFlowReturn flow =
       buffer ? state.chain (pad, parent, buffer) : GST_FLOW_OK;
   if (!state.stream.has_failed)

@@ -24,11 +24,12 @@ protected:
   }
   ~LargeFrames () override { std::filesystem::remove_all (folder_); }
 
-  void record (const std::string &options, int frames = kFrames)
+  void record (const std::string &options, int frames = kFrames,
+      int width = kWidth, int height = kHeight)
   {
     Pipeline pipeline (
         "videotestsrc pattern=snow num-buffers=" + std::to_string (frames) +
-        " ! " + gray_caps (kWidth, kHeight, "25/1", "GRAY16_LE") +
+        " ! " + gray_caps (width, height, "25/1", "GRAY16_LE") +
         " ! codedexposure-recordmux " + options +
         " ! filesink location=" + path ());
     ASSERT_EQ (pipeline.play (), "");
@@ -102,6 +103,31 @@ TEST_F (LargeFrames, AreReadAfterASeek)
         (rate > 0 ? 80 : 40) * GST_MSECOND);
     gst_sample_unref (last);
   }
+}
+
+/* A frame waits for its rest where bytes are collected. */
+TEST_F (LargeFrames, AndSmallOnesThatAreCutOffAreGoneInTheNextRun)
+{
+  for (const auto &[width, height] :
+      {std::pair{kWidth, kHeight}, std::pair{64, 48}})
+    for (const char *options : {"", "salvage=true"}) {
+      SCOPED_TRACE (std::to_string (width) + " " + options);
+      record ("codec=raw", kFrames, width, height);
+      const std::string part = path () + ".part";
+      std::filesystem::copy_file (path (), part);
+      std::filesystem::resize_file (
+          part, std::filesystem::file_size (part) * 3 / 5);
+      Pipeline pipeline ("filesrc name=file location=" + part +
+                         " ! queue ! codedexposure-recorddemux name=demux " +
+                         options + " ! fakesink");
+      EXPECT_EQ (pipeline.play (), "");
+      const ObjectPtr<GstElement> file = pipeline["file"];
+      gst_element_set_state (
+          GST_ELEMENT (GST_OBJECT_PARENT (file.get ())), GST_STATE_READY);
+      g_object_set (file.get (), "location", path ().c_str (), nullptr);
+      expect_frames (pipeline, kFrames);
+      std::filesystem::remove (part);
+    }
 }
 
 TEST_F (LargeFrames, ThatAreCutOffAreMissing)

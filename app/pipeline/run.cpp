@@ -303,7 +303,10 @@ Run::on_error (GstMessage *message)
     end (Exit::failed);
     return;
   }
-  status_.line ("error: " + told (message));
+  const std::string text = told (message);
+  status_.line ("error: " + text);
+  if (error_.text.empty ())
+    error_ = {GST_OBJECT_NAME (source), text};
   const std::string remedy = remedy_for (kind, parts);
   if (!remedy.empty ())
     status_.line (remedy);

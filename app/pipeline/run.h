@@ -84,6 +84,9 @@ private:
   bool silent_ = false;  // no frame came for a while, and that was said
   bool interrupted_ = false;
   bool failed_ = false; // the stream ends because of an error
+  struct {
+    std::string element, text;
+  } error_; // the first
   std::string flaws_before_error_;
   guint patience_ = 0; // source that then ends it without its end; 0: none
   bool damaged_;       // frames are missing or damaged

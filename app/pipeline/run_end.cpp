@@ -148,6 +148,8 @@ Run::print_json (Exit exit, const std::string &flaws) const
       {"flaws", flaws.empty () ? "" : flaws.substr (2)}, {"outputs", outputs},
       {"damaged", damaged_}, {"interrupted", interrupted_},
       {"status", int (exit)}};
+  if (!error_.text.empty ())
+    json["error"] = error_.text, json["element"] = error_.element;
   if (!job_.schedule.empty ())
     json["schedule"] = job_.schedule;
   app::print_json (json);

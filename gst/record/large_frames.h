@@ -15,8 +15,6 @@ namespace codedexposure::gst
 class LargeFrames
 {
 public:
-  /** Before a run. */
-  void restart () { blocks_ = {}; }
   /** What the demuxer gets in place of @p bytes, which its pad @p sink has read
    * at @p at. Transfer: full, of both. */
   GstBuffer *pulled (GstPad *sink, guint64 at, GstBuffer *bytes);

@@ -264,15 +264,12 @@ read_blocks (Source &file, const Element &segment, RecordingInfo &info)
         part && (!part->is_open || holds) &&
         (is_one_of (kOfSegment, part->id) || is_one_of (kOfCluster, part->id) ||
             is_one_of (kOfGroup, part->id));
-    const std::uint64_t next = is_known && holds ? part->data
-                               : is_known        ? part->end
-                                                 : file.size () + 1;
-    if (next > file.size ()) {
+    if (!is_known || (holds ? part->data : part->end) > file.size ()) {
       at = next_cluster (file, at + 1);
       info.is_damaged |= at < file.size () || !is_cut;
       continue;
     }
-    at = next;
+    at = holds ? part->data : part->end;
     if (part->id == kTimestamp)
       walk.cluster = file.number (*part);
     read_extras (file, *part, info);

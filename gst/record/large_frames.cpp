@@ -54,11 +54,17 @@ LargeFrames::pulled (GstPad *sink, guint64 at, GstBuffer *bytes)
 GstBuffer *
 LargeFrames::pushed (GstBuffer *bytes)
 {
-  const gsize size = gst_buffer_get_size (bytes);
-  if (blocks_.passes (size))
+  GstMapInfo map;
+  if (!gst_buffer_map (bytes, &map, GST_MAP_READ))
     return bytes;
-  const BufferPtr owned (bytes);
-  const std::string passed = blocks_.take (text_of (bytes, 0, size));
+  const std::string_view text (
+      reinterpret_cast<const char *> (map.data), map.size);
+  const bool passes = blocks_.passes (text);
+  const std::string passed = passes ? "" : blocks_.take (text);
+  gst_buffer_unmap (bytes, &map);
+  if (passes)
+    return bytes;
+  gst_buffer_unref (bytes);
   return passed.empty ()
              ? nullptr
              : gst_buffer_new_memdup (passed.data (), passed.size ());

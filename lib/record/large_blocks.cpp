@@ -18,6 +18,13 @@ constexpr std::size_t kHeader = 12;
 /* Of a stream; more is damage. */
 constexpr std::uint64_t kMostHeld = std::uint64_t (256) << 20;
 
+/* Of an element of a stream. */
+bool
+is_large (std::uint64_t size)
+{
+  return size > LargeBlocks::kMost && size <= kMostHeld;
+}
+
 std::string
 digits (std::uint64_t value)
 {
@@ -176,12 +183,34 @@ LargeBlocks::restart (std::uint64_t at)
   at_ = next_ = at;
 }
 
-bool
-LargeBlocks::passes (std::size_t size)
+/* The @bytes from at_ on. */
+Source
+LargeBlocks::source_of (std::string_view bytes) const
 {
-  if (!held_.empty () || next_ < at_ + size)
+  return {[at = at_, bytes] (std::uint64_t place, std::size_t length) {
+            const std::size_t from = std::size_t (place - at);
+            return std::string (
+                bytes.substr (std::min (from, bytes.size ()), length));
+          },
+      at_ + bytes.size ()};
+}
+
+bool
+LargeBlocks::passes (std::string_view bytes)
+{
+  if (!held_.empty ())
     return false;
-  at_ += size;
+  const std::uint64_t end = at_ + bytes.size ();
+  Source source = source_of (bytes);
+  std::uint64_t next = next_;
+  while (next < end) {
+    const auto element = element_of (source, next);
+    if (element ? is_large (element->end - next) : end - next < kHeader)
+      return false;
+    next = element ? element->end : kUnlimited;
+  }
+  next_ = next;
+  at_ = end;
   return true;
 }
 
@@ -213,17 +242,12 @@ LargeBlocks::take (std::string_view bytes)
         passed);
     if (held_.empty ())
       break;
-    Source source (
-        [this] (std::uint64_t place, std::size_t length) {
-          return held_.substr (
-              std::min (std::size_t (place - at_), held_.size ()), length);
-        },
-        at_ + held_.size ());
+    Source source = source_of (held_);
     const auto element = element_of (source, at_);
     if (!element && held_.size () < kHeader)
       break;
     next_ = element ? element->end : kUnlimited;
-    if (next_ - at_ <= kMost || next_ - at_ > kMostHeld)
+    if (!is_large (next_ - at_))
       continue;
     if (held_.size () < next_ - at_) {
       next_ = at_;

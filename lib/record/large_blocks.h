@@ -48,8 +48,8 @@ public:
 
   /** An element follows, at @p at. */
   void restart (std::uint64_t at);
-  /** Whether the next @p size bytes go on as they are, without take (). */
-  bool passes (std::size_t size);
+  /** Whether @p bytes go on as they are, without take (). */
+  bool passes (std::string_view bytes);
   /** What goes on after @p bytes; a large block does when all of it is there.
    */
   std::string take (std::string_view bytes);
@@ -68,6 +68,7 @@ private:
   static std::optional<Block> block_of (
       ebml::Source &source, std::uint64_t at, const ebml::Element &element);
   static std::vector<Patch> patches_of (const Block &block);
+  ebml::Source source_of (std::string_view bytes) const;
   void pass (std::size_t size, std::string &to);
   void hide (const Block &block);
 

@@ -137,7 +137,7 @@ TEST (LargeBlocks, AreHiddenInAStream)
     int kept = 0;
     for (std::size_t at = 0; at < kStream.size (); at += part) {
       const std::string bytes = kStream.substr (at, part);
-      if (large.passes (bytes.size ())) {
+      if (large.passes (bytes)) {
         shown += bytes;
         continue;
       }
@@ -159,6 +159,23 @@ TEST (LargeBlocks, FewBytesAtATimePassAtOnce)
   for (const char byte : bytes)
     passed += large.take ({&byte, 1});
   EXPECT_EQ (passed, bytes);
+}
+
+TEST (LargeBlocks, AStreamWithoutThemIsNotCopied)
+{
+  const std::string bytes =
+      kBegin + cluster (element ("\xa3", frame (100, 'b'))) + kEnd;
+  for (std::size_t part = 1; part < bytes.size (); part++) {
+    LargeBlocks large;
+    const std::string_view all = bytes;
+    /* Nothing but where a header is cut. */
+    if (large.passes (all.substr (0, part)))
+      EXPECT_TRUE (large.passes (all.substr (part))) << part;
+    else
+      EXPECT_LT (large.take (all.substr (0, part)).size (), part) << part;
+  }
+  EXPECT_TRUE (LargeBlocks ().passes (bytes));
+  EXPECT_FALSE (LargeBlocks ().passes (kStream));
 }
 
 /* After a seek, a stream goes on with another element. */

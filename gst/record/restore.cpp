@@ -279,7 +279,7 @@ check_end (Self *self)
 void
 forget_frames (RestoreState &state)
 {
-  state.held.clear ();
+  state.held = {};
   state.last_frame.reset ();
   state.damage.forget ();
   state.track.forget ();
@@ -383,20 +383,18 @@ release (Self *self, bool all)
   constexpr std::size_t kMaxHeld = 8;
   RestoreState &state = self->state;
   GstFlowReturn flow = GST_FLOW_OK;
-  while (!state.held.empty () && flow == GST_FLOW_OK) {
+  while (!state.held.items.empty () && flow == GST_FLOW_OK) {
     std::optional<TrackReader::Match> match;
-    if (const auto *frame = std::get_if<BufferPtr> (&state.held.front ())) {
-      match =
-          GST_BUFFER_PTS_IS_VALID (frame->get ())
-              ? state.track.take (Nanoseconds (GST_BUFFER_PTS (frame->get ())),
-                    Nanoseconds (state.segment.start),
-                    !all && state.held.size () <= kMaxHeld)
-              : TrackReader::Match ();
+    if (GstBuffer *frame = state.held.first_frame ()) {
+      match = GST_BUFFER_PTS_IS_VALID (frame)
+                  ? state.track.take (Nanoseconds (GST_BUFFER_PTS (frame)),
+                        Nanoseconds (state.segment.start),
+                        !all && state.held.items.size () <= kMaxHeld)
+                  : TrackReader::Match ();
       if (!match)
         break;
     }
-    Item item = std::move (state.held.front ());
-    state.held.pop_front ();
+    Item item = state.held.take_first ();
     if (auto *frame = std::get_if<BufferPtr> (&item))
       flow = push_frame (self, std::move (*frame), *match);
     else
@@ -420,26 +418,24 @@ chain (GstPad *, GstObject *parent, GstBuffer *buffer) noexcept
     }
     return gst_pad_push (state.src, frame.release ());
   }
-  state.held.push_back (std::move (frame));
+  state.held.add (std::move (frame));
   return release (self, false);
 }
 
 /* All lines that stand before @next in the file have come. A frame that still
- * waits for its own was the last one that a seek let through. Returns it if the
- * seek was to where it is: then the demuxer goes on behind it. */
+ * waits for its own was the last one that a seek let through. Returns it: if
+ * the seek was to where the demuxer was, it goes on behind it. */
 BufferPtr
 leave_segment (Self *self, const GstSegment &next)
 {
-  std::deque<Item> &held = self->state.held;
+  HeldItems &held = self->state.held;
   BufferPtr last;
   do {
     release (self, false);
-    if (held.empty () || !std::holds_alternative<BufferPtr> (held.front ()))
-      continue;
-    last = std::get<BufferPtr> (std::move (held.front ()));
-    held.pop_front ();
-  } while (!held.empty ());
-  if (last && (next.rate < 0 || GST_BUFFER_PTS (last.get ()) != next.start))
+    if (held.first_frame ())
+      last = std::get<BufferPtr> (held.take_first ());
+  } while (!held.items.empty ());
+  if (last && (next.rate < 0 || GST_BUFFER_PTS (last.get ()) < next.start))
     last.reset ();
   return last;
 }
@@ -465,15 +461,15 @@ sink_event (GstPad *pad, GstObject *parent, GstEvent *owned) noexcept
   if (type == GST_EVENT_EOS)
     release (self, true);
   if (type == GST_EVENT_SEGMENT) {
-    BufferPtr first = leave_segment (self, *segment_of (owned));
+    BufferPtr left = leave_segment (self, *segment_of (owned));
     const gboolean is_taken = take_event (self, std::move (event));
-    if (first)
-      state.held.push_back (std::move (first));
+    if (left)
+      state.held.add_left (std::move (left));
     return is_taken;
   }
-  if (state.held.empty ())
+  if (state.held.items.empty ())
     return take_event (self, std::move (event));
-  state.held.push_back (std::move (event));
+  state.held.items.push_back (std::move (event));
   return TRUE;
 }
 

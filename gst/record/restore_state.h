@@ -23,12 +23,47 @@ namespace codedexposure::gst
 /** A frame, or a serialised event that came after one that waits. */
 using Item = std::variant<BufferPtr, EventPtr>;
 
+/** What waits for the line of its first frame. */
+struct HeldItems {
+  std::deque<Item> items;
+  bool is_first_left = false; ///< a seek came before its line
+
+  /** Null: the first item is none. */
+  GstBuffer *first_frame () const
+  {
+    const auto *frame =
+        items.empty () ? nullptr : std::get_if<BufferPtr> (&items.front ());
+    return frame ? frame->get () : nullptr;
+  }
+  Item take_first ()
+  {
+    Item item = std::move (items.front ());
+    items.pop_front ();
+    is_first_left = false;
+    return item;
+  }
+  void add_left (BufferPtr frame)
+  {
+    items.push_back (std::move (frame));
+    is_first_left = true;
+  }
+  /** If @p frame is the one that was left or before it, the demuxer went back,
+   * and that one comes again. */
+  void add (BufferPtr frame)
+  {
+    if (is_first_left &&
+        GST_BUFFER_PTS (frame.get ()) <= GST_BUFFER_PTS (first_frame ()))
+      take_first ();
+    items.push_back (std::move (frame));
+  }
+};
+
 /** What is forgotten before a run. Stream lock of the sink pad. */
 struct Run {
   GstVideoInfo info = {};
   bool encoded = false; ///< there are no pixels to be checked
   GstSegment segment = {};
-  std::deque<Item> held;
+  HeldItems held;
   guint32 segment_seqnum = GST_SEQNUM_INVALID; ///< of the segment
   bool is_complete = true;                     ///< all its frames are to come
   std::optional<StreamSetup> container;     ///< setup of the container's tags

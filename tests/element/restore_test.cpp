@@ -286,6 +286,50 @@ TEST_F (Restore, ASeekWithoutAFlushLeavesTheFrameWhoseLineHasNotCome)
   EXPECT_EQ (counted (file.element (), "frames-missing"), 0u);
 }
 
+/* The demuxer was sent to a frame, and had read it before it stopped. */
+TEST_F (Restore, AFrameThatASeekWithoutAFlushGoesBackToIsThereOnce)
+{
+  Recording again;
+  push_line (0);
+  push_frame (0);
+  push_frame (1);
+  gst_harness_push_event (track.get (), segment_from (kPeriod, 0));
+  file.push_event (segment_from (kPeriod, 0));
+  for (int i = 1; i < kFrames; i++) {
+    file.push (std::move (again.frames[std::size_t (i)]));
+    push_line (i);
+  }
+  end ();
+  int next = 0;
+  while (const BufferPtr frame = file.pull ())
+    EXPECT_EQ (GST_BUFFER_PTS (frame.get ()), GstClockTime (next++) * kPeriod);
+  EXPECT_EQ (next, kFrames);
+  EXPECT_EQ (counted (file.element (), "frames-unknown"), 0u);
+  EXPECT_EQ (counted (file.element (), "frames-missing"), 0u);
+}
+
+/* It read a further one before it stopped, and goes on behind it. */
+TEST_F (Restore, AFrameThatASeekWithoutAFlushGoesOnBehindIsThere)
+{
+  push_line (0);
+  push_frame (0);
+  push_frame (1);
+  gst_harness_push_event (track.get (), segment_from (0, 0));
+  file.push_event (segment_from (0, 0));
+  for (int i = 1; i < kFrames; i++) {
+    push_line (i);
+    if (i + 1 < kFrames)
+      push_frame (i + 1);
+  }
+  end ();
+  int next = 0;
+  while (const BufferPtr frame = file.pull ())
+    EXPECT_EQ (GST_BUFFER_PTS (frame.get ()), GstClockTime (next++) * kPeriod);
+  EXPECT_EQ (next, kFrames);
+  EXPECT_EQ (counted (file.element (), "frames-unknown"), 0u);
+  EXPECT_EQ (counted (file.element (), "frames-missing"), 0u);
+}
+
 TEST_F (Restore, AfterASeekTheFramesBeforeItAreNotMissed)
 {
   file.push_event (gst_event_new_flush_start ());

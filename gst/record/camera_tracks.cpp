@@ -127,10 +127,19 @@ namespace
 
 GstStaticCaps file_caps = GST_STATIC_CAPS ("timestamp/x-file");
 
+guint32
+segment_number (GstPad *pad)
+{
+  const EventPtr segment (gst_pad_get_sticky_event (pad, GST_EVENT_SEGMENT, 0));
+  return segment ? gst_event_get_seqnum (segment.get ()) : GST_SEQNUM_INVALID;
+}
+
 /* A decoder gives the time of the frame before to one that is earlier, and that
- * of the segment's start to one that begins before it and lasts longer. */
+ * of the segment's start to one that begins before it and lasts longer.
+ * Backwards, it holds a frame until the next one comes, also if that is of
+ * another segment: its number stands in place of a duration. */
 GstPadProbeReturn
-on_encoded (GstPad *, GstPadProbeInfo *info, gpointer) noexcept
+on_encoded (GstPad *pad, GstPadProbeInfo *info, gpointer) noexcept
 {
   GstBuffer *frame =
       gst_buffer_make_writable (GST_PAD_PROBE_INFO_BUFFER (info));
@@ -138,7 +147,7 @@ on_encoded (GstPad *, GstPadProbeInfo *info, gpointer) noexcept
   const CapsPtr caps (gst_static_caps_get (&file_caps));
   if (GST_BUFFER_PTS_IS_VALID (frame))
     gst_buffer_add_reference_timestamp_meta (
-        frame, caps.get (), GST_BUFFER_PTS (frame), GST_CLOCK_TIME_NONE);
+        frame, caps.get (), GST_BUFFER_PTS (frame), segment_number (pad));
   return GST_PAD_PROBE_OK;
 }
 
@@ -146,7 +155,7 @@ on_encoded (GstPad *, GstPadProbeInfo *info, gpointer) noexcept
 
 GstPadProbeReturn
 CameraTracks::on_decoded (
-    GstPad *, GstPadProbeInfo *info, gpointer self) noexcept
+    GstPad *pad, GstPadProbeInfo *info, gpointer self) noexcept
 {
   GstBuffer *frame =
       gst_buffer_make_writable (GST_PAD_PROBE_INFO_BUFFER (info));
@@ -155,6 +164,8 @@ CameraTracks::on_decoded (
   auto *own = gst_buffer_get_reference_timestamp_meta (frame, caps.get ());
   if (!own)
     return GST_PAD_PROBE_OK;
+  if (own->duration != segment_number (pad))
+    return GST_PAD_PROBE_DROP;
   const GstClockTime before = std::exchange (
       static_cast<CameraTracks *> (self)->decoded_, GST_BUFFER_PTS (frame));
   if (GST_BUFFER_PTS (frame) == before ||

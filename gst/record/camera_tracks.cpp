@@ -246,6 +246,35 @@ CameraTracks::frames_queued (GstElement *, gpointer self) noexcept
   return queued;
 }
 
+GstPadProbeReturn
+CameraTracks::on_read (
+    GstPad *pad, GstPadProbeInfo *info, gpointer self) noexcept
+{
+  SegmentLeft &segment = static_cast<CameraTracks *> (self)->segment_;
+  if (GST_PAD_PROBE_INFO_TYPE (info) & GST_PAD_PROBE_TYPE_BUFFER) {
+    segment.last = GST_BUFFER_PTS (GST_PAD_PROBE_INFO_BUFFER (info));
+    return GST_PAD_PROBE_OK;
+  }
+  GstEvent *event = GST_PAD_PROBE_INFO_EVENT (info);
+  const guint seqnum = gst_event_get_seqnum (event);
+  if (GST_EVENT_TYPE (event) != GST_EVENT_SEGMENT || seqnum == segment.seqnum)
+    return GST_PAD_PROBE_OK;
+  if (segment.seqnum != GST_SEQNUM_INVALID)
+    gst_pad_send_event (pad, new_event (segment));
+  segment = {.seqnum = seqnum, .backwards = segment_of (event)->rate < 0};
+  return GST_PAD_PROBE_OK;
+}
+
+void
+CameraTracks::tell_left_segments ()
+{
+  if (queue_)
+    gst_pad_add_probe (pad_of (queue_, "sink").get (),
+        GstPadProbeType (
+            GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM),
+        on_read, this, nullptr);
+}
+
 void
 CameraTracks::add_lines (GstPad *pad)
 {
@@ -276,6 +305,7 @@ CameraTracks::end ()
   remove_part (element_, decoder_);
   deep_ = {};
   decoded_ = GST_CLOCK_TIME_NONE;
+  segment_ = {};
 }
 
 void

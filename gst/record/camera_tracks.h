@@ -8,6 +8,7 @@
 #include "base/geometry.h"
 #include "common/raii.h"
 #include "schedule/timing.h"
+#include "segment.h"
 
 namespace codedexposure::gst
 {
@@ -40,6 +41,9 @@ public:
    * recording, or their decoder is missing. */
   void add_frames (GstPad *pad, const FrameReading &how);
   bool has_frames () const { return queue_; }
+  /** After add_frames (): the part that takes its frames is told of segments
+   * that a seek leaves. */
+  void tell_left_segments ();
   void add_lines (GstPad *pad);
 
   /** Removes what add_frames () made. */
@@ -57,6 +61,8 @@ private:
   static GstPadProbeReturn on_deep_frame (
       GstPad *, GstPadProbeInfo *info, gpointer self) noexcept;
   static guint frames_queued (GstElement *, gpointer self) noexcept;
+  static GstPadProbeReturn on_read (
+      GstPad *pad, GstPadProbeInfo *info, gpointer self) noexcept;
   static GstPadProbeReturn on_decoded (
       GstPad *, GstPadProbeInfo *info, gpointer self) noexcept;
   bool take_raw (GstPad *pad, const GstCaps *caps, const FrameReading &how);
@@ -67,6 +73,7 @@ private:
   GstElement *queue_ = nullptr, *decoder_ = nullptr;
   Deep deep_;
   GstClockTime decoded_ = GST_CLOCK_TIME_NONE; ///< time of the last frame
+  SegmentLeft segment_;                        ///< that is read
 };
 
 } // namespace codedexposure::gst

@@ -135,6 +135,10 @@ PartnerInput::event (GstPad *pad, GstObject *, GstEvent *owned) noexcept
   case GST_EVENT_SEGMENT:
     self.segments_.own.follow (event.get ());
     break;
+  case GST_EVENT_CUSTOM_DOWNSTREAM_OOB:
+    if (const auto left = parse_event<SegmentLeft> (event.get ()))
+      self.left_[left->seqnum] = *left;
+    break;
   case GST_EVENT_EOS:
     self.has_ended_ = true;
     break;
@@ -146,6 +150,7 @@ PartnerInput::event (GstPad *pad, GstObject *, GstEvent *owned) noexcept
     self.is_wanted_ = true;
     self.partners_.clear ();
     self.segments_.own = {};
+    self.left_.clear ();
     break;
   default:
     break;
@@ -161,6 +166,7 @@ PartnerInput::restart ()
 {
   const std::lock_guard lock (lock_);
   partners_.clear ();
+  left_.clear ();
   caps_.reset ();
   may_wait_ = is_wanted_ = true;
   is_off_beam_ = has_ended_ = is_stalled_ = is_ahead_ = false;
@@ -171,6 +177,8 @@ void
 PartnerInput::next_segment (GstEvent *segment)
 {
   locked (lock_, [&] {
+    if (segments_.frames.seqnum != gst_event_get_seqnum (segment))
+      left_.erase (segments_.frames.seqnum);
     segments_.frames.follow (segment);
     while (!partners_.empty () &&
            partners_.front ().segment < segments_.frames.count)
@@ -193,12 +201,24 @@ PartnerInput::let_wait (bool waits)
   moved_.notify_all ();
 }
 
+bool
+PartnerInput::is_broken_off (GstBuffer *frame) const
+{
+  const GstClockTime duration =
+      GST_BUFFER_DURATION_IS_VALID (frame) ? GST_BUFFER_DURATION (frame) : 0;
+  const auto left = left_.find (segments_.frames.seqnum);
+  return segments_.is_ahead () ||
+         (left != left_.end () &&
+             left->second.is_behind (GST_BUFFER_PTS (frame), duration / 2));
+}
+
 /* A frame that came late when it was recorded is in the place of its partner,
  * too. */
 GstFlowReturn
 PartnerInput::take (
-    GstElement *element, GstClockTime pts, std::optional<Partner> &to)
+    GstElement *element, GstBuffer *frame, std::optional<Partner> &to)
 {
+  const GstClockTime pts = GST_BUFFER_PTS (frame);
   std::unique_lock lock (lock_);
   is_ahead_ = false;
   const auto time_of = [this] (const Waiting &partner) {
@@ -221,7 +241,7 @@ PartnerInput::take (
            partners_.size () >= kMost ||
            std::ranges::any_of (partners_,
                [&] (const Waiting &one) { return time_of (one) > pts; }) ||
-           segments_.is_ahead () || has_ended_ || is_flushing_ || !may_wait_;
+           is_broken_off (frame) || has_ended_ || is_flushing_ || !may_wait_;
   };
   while (!is_stalled_ && !moved_.wait_for (lock, kPatience, is_settled))
     is_stalled_ = frames_queued (lock, element) >= kQueued && !is_settled ();
@@ -229,7 +249,7 @@ PartnerInput::take (
   if (found == partners_.end () && (!may_wait_ || is_flushing_))
     return GST_FLOW_FLUSHING;
   if (found == partners_.end ())
-    return segments_.is_ahead () ? kBrokenOff : GST_FLOW_OK;
+    return is_broken_off (frame) ? kBrokenOff : GST_FLOW_OK;
   to = std::move (*found);
   partners_.erase (partners_.begin (), std::next (found));
   moved_.notify_all ();
@@ -245,7 +265,7 @@ PartnerInput::attach (
     return GST_FLOW_OK;
   const GstClockTime pts = GST_BUFFER_PTS (frame);
   std::optional<Partner> partner;
-  if (const GstFlowReturn flow = take (element, pts, partner);
+  if (const GstFlowReturn flow = take (element, frame, partner);
       flow != GST_FLOW_OK)
     return flow;
   GstBuffer *buffer = partner ? partner->buffer.get () : nullptr;

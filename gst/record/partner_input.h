@@ -5,6 +5,7 @@
 
 #include <condition_variable>
 #include <deque>
+#include <map>
 #include <mutex>
 #include <optional>
 
@@ -74,7 +75,9 @@ private:
   /** That with the time @p pts, if there is one; those before it are dropped.
    * As attach (). */
   GstFlowReturn take (
-      GstElement *element, GstClockTime pts, std::optional<Partner> &to);
+      GstElement *element, GstBuffer *frame, std::optional<Partner> &to);
+  /** A seek left @p frame without its partner. */
+  bool is_broken_off (GstBuffer *frame) const;
 
   GstPad *pad_ = nullptr;
   AloneFrames alone_;
@@ -86,6 +89,8 @@ private:
   };
   std::deque<Waiting> partners_;
   SegmentsBeside segments_;
+  /** Segments from that of the frames on which are left, by their seqnum. */
+  std::map<guint32, SegmentLeft> left_;
   CapsPtr caps_;
   bool may_wait_ = true;     ///< let_wait ()
   bool is_flushing_ = false; ///< the pad is flushed, or not active

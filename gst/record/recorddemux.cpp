@@ -192,6 +192,7 @@ add_partner (Self *self)
       state.partner.restore (), "src", state.coded.restore (), "partner");
   state.partner.add_lines (text);
   add_frames (self, state.partner, video);
+  state.partner.tell_left_segments ();
 }
 
 void

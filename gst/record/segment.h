@@ -7,6 +7,7 @@
 #include <gst/gst.h>
 
 #include "common/raii.h"
+#include "common/structure.h"
 
 namespace codedexposure::gst
 {
@@ -55,6 +56,27 @@ struct SegmentsBeside {
   /** That both have reached. */
   guint64 reached () const { return std::min (own.count, frames.count); }
   bool is_ahead () const { return own.count > frames.count; }
+};
+
+/** Out of band, downstream: no further frame of a segment is read. A decoder
+ * holds the next segment until a frame of it comes. */
+struct SegmentLeft {
+  static constexpr const char *kName = "codedexposure/segment-left";
+  static constexpr GstEventType kType = GST_EVENT_CUSTOM_DOWNSTREAM_OOB;
+  guint seqnum = GST_SEQNUM_INVALID; ///< of the segment
+  bool backwards = false;
+  /** Time in the file of the last frame that was read; none: there was none. */
+  std::optional<guint64> last = {};
+  CODED_FIELDS (seqnum, backwards, last);
+
+  /** Backwards, the last frame stays in the decoder. @p tolerance: to which
+   * @p time is known. */
+  bool is_behind (GstClockTime time, GstClockTime tolerance) const
+  {
+    if (!last || !GST_CLOCK_TIME_IS_VALID (time))
+      return true;
+    return backwards ? time < *last + tolerance : time > *last + tolerance;
+  }
 };
 
 inline EventPtr

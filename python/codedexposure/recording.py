@@ -206,9 +206,11 @@ class Recording:
                         frame = frame_of(sample)
                         # The second run begins with those of the first.
                         if last is None or frame.time_ns > last or not salvage:
-                            last = frame.time_ns
+                            last = (frame.time_ns if last is None else
+                                    max(last, frame.time_ns))
                             yield player, frame
-                    if player.was_cut and not (self._cut or self._open or salvage):
+                    if (player.was_cut and not salvage
+                            and self._goes_on(last, bool(decoder))):
                         raise ContainerError("its end was not reached")
                     self._cut |= player.was_cut
                 break
@@ -221,6 +223,17 @@ class Recording:
             raise self._no_frame()
         if self._cut:
             player.warn("the recording is cut off; what could be decoded was")
+
+    def _goes_on(self, last: int | None, decoded: bool) -> bool:
+        """Of one whose end was not reached: whether frames follow the last one
+        that was, behind damage."""
+        if not (self._cut or self._open):
+            return True
+        with Player(self._description("", True, decode=False), self.path,
+                    quiet=True) as player:
+            return any((last is None or position_of(sample) > last)
+                       and not (decoded and shows_pattern(sample))
+                       for sample in player)
 
     def play_whole(self, decoder: str) -> Iterator[Frame]:
         """What the decoder gives, of all coded frames."""
@@ -254,6 +267,9 @@ class Recording:
                         quiet=True) as player:
                 times = [(position_of(sample), shows_pattern(sample))
                          for sample in player]
+                if player.was_cut and self._goes_on(
+                        max(times)[0] if times else None, False):
+                    raise ContainerError("its end was not reached")
         except ContainerError as damage:
             raise UncountableError(
                 f"{self.path}: the index or the tags are damaged ({damage}), so "

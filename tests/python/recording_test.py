@@ -249,9 +249,26 @@ class Faults(unittest.TestCase):
         (SCRATCH / "cut.mkv").write_bytes(data[:len(data) // 2])
         frames, said = read("cut.mkv")
         self.assertIn("the recording is cut off", said)
+        self.assertNotIn("damaged", said)
         self.assertEqual(opened("cut.mkv").schedule["code"], "staircase")
         self.assertGreater(len(frames), 8)
         self.assertTrue(decoded("plain.mkv").startswith(pixels(frames)))
+
+    def test_cut_with_a_hole(self):
+        data = (SCRATCH / "plain.mkv").read_bytes()
+        begins = [at.start() for at in re.finditer(b"\x1f\x43\xb6\x75", data)]
+        for name, end in ("hole.mkv", None), ("twice.mkv", begins[10] + 99):
+            (SCRATCH / name).write_bytes(
+                data[:begins[4] + 99] + data[begins[6] + 99:end])
+            with self.subTest(name):
+                frames, said = read(name)
+                self.assertEqual([f.frame for f in frames[::4]],
+                                 [0, 1, 2, 3, *range(7, 10 if end else 12)])
+                self.assertEqual(pixels(frames), decoded(name, status=3))
+                self.assertIn("damaged between its frames", said)
+                self.assertIn("the recording is cut off", said)
+                with self.assertRaises(codedexposure.UncountableError):
+                    len(opened(name).coded())
 
     def test_damage_anywhere(self):
         data = (SCRATCH / "plain.mkv").read_bytes()

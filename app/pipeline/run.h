@@ -92,6 +92,7 @@ private:
   bool damaged_;       // frames are missing or damaged
   bool container_damaged_ = false;
   guint64 not_coded_ = 0, lost_ = 0; // coded frames
+  guint64 missing_ = 0;              // in the recording, as far as it was read
   std::string noticed_;              // the last notice
   std::vector<std::string> wrote_;   // by the window
 };

@@ -76,6 +76,8 @@ Run::finish ()
   }
   const guint64 lost = counters_of (job_.recorders, "frames-lost");
   lost_ = std::max (lost_, lost);
+  if (job_.reader)
+    missing_ = counter_of (job_.reader, "frames-missing");
   const bool published = publish ();
   RunResult result{exit_, frames (), container_damaged_, interrupted_};
   if (container_damaged_)
@@ -144,7 +146,8 @@ Run::print_json (Exit exit, const std::string &flaws) const
   outputs.insert (outputs.end (), wrote_.begin (), wrote_.end ());
   nlohmann::ordered_json json = {{"command", job_.command},
       {"source", job_.source}, {"frames", frames ()}, {"not_coded", not_coded_},
-      {"lost", lost_}, {"pictures", job_.outputs.frames ()},
+      {"lost", lost_}, {"missing", missing_},
+      {"pictures", job_.outputs.frames ()},
       {"flaws", flaws.empty () ? "" : flaws.substr (2)}, {"outputs", outputs},
       {"damaged", damaged_}, {"interrupted", interrupted_},
       {"status", int (exit)}};

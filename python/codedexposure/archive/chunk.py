@@ -161,7 +161,11 @@ def decode(plan, recording, chunk, scratch):
         raise Problem(f'decode ended with status {status}')
     check_source(source)
     expected = source.frames_of(chunk, plan.length)
-    # What is too damaged to be decoded is lost.
+    # What is too damaged to be decoded is lost. The numbers of frames do not show
+    # it before the first frame and after the last one.
+    if status == DAMAGED:
+        said['lost'] = max(said['lost'],
+                           min(said['missing'], expected - said['frames']))
     found = said['frames'] + (said['lost'] if status == DAMAGED else 0)
     if found < expected:
         raise Problem(f'decode read {found} of the {expected} coded frames of this '

@@ -184,13 +184,19 @@ def submit(options):
                     raise Problem(f'{path} exists; choose another folder, or set '
                                   '--force to replace it')
     chunk.check_decodes(made)
+    is_new = not os.path.exists(store.work)
     store.create()
     with store.lock('run'):
         refuse_second(store)  # submitted meanwhile
         write_json(store.plan, made.to_json())
         for line in measure.describe(made):
             print(line)
-        start(store, made)
+        try:
+            start(store, made)
+        except Problem:
+            if made.engine['on'] == 'slurm' and not store.last_jobs():
+                store.forget(is_new)  # other options of Slurm need another plan
+            raise
     return outcome(store, made)
 
 

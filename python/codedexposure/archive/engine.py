@@ -107,7 +107,7 @@ def sbatch(kind, store, run, tasks, engine, threads, after=None):
     said = subprocess.run(words + [path], capture_output=True, text=True,
                           check=False)
     if said.returncode != 0:
-        raise Problem(f'sbatch refused {path}: {said.stderr.strip()}')
+        raise Problem(f'sbatch refused {kind}.sh: {said.stderr.strip()}')
     return said.stdout.strip().split(';')[0]
 
 
@@ -119,6 +119,8 @@ def start_slurm(store, plan, run, chunks, merges):
         after = sbatch('chunk', store, run, tasks_for(len(chunks), most), engine,
                        plan.threads)
         jobs.append(after)
+        # The other may be refused.
+        write_json(os.path.join(run, 'jobs.json'), jobs)
     jobs.append(sbatch('merge', store, run, tasks_for(len(merges), most), engine,
                        1, after))
     write_json(os.path.join(run, 'jobs.json'), jobs)

@@ -8,6 +8,7 @@ FOLDER/.archive/merged/R.json       the manifest of a finished recording
 FOLDER/.archive/runs/N/             lists, script and logs of a run
 
 A chunk is written to a folder of another name and renamed as a whole."""
+import contextlib
 import fcntl
 import hashlib
 import json
@@ -125,6 +126,14 @@ class Store:
             raise Problem(f'{self.folder} cannot hold an archive: '
                           f'{error.strerror}; name a folder that can be '
                           'written') from None
+
+    def forget(self, is_new):
+        """Is no archive any more; a new one leaves nothing."""
+        os.remove(self.plan)
+        if is_new:
+            shutil.rmtree(self.work)
+            with contextlib.suppress(OSError):
+                os.rmdir(self.folder)
 
     def parts(self, recording):
         return os.path.join(self.work, 'parts', f'{recording:06d}')

@@ -54,6 +54,7 @@ struct Stack {
   GstVideoInfo info = {};
   std::string origin;         // of the pictures that come
   std::string written_origin; // of those in the file
+  int tagged_bits = 0;
   std::unique_ptr<StackFile> file;
   bool is_finished = false;
 };
@@ -169,15 +170,14 @@ fail (GstBaseSink *sink, const Error &error)
 }
 
 void
-open_file (GstBaseSink *sink, const FrameMeta &meta)
+open_file (GstBaseSink *sink, GstBuffer *picture)
 {
   Stack &state = state_of (sink);
   const GstVideoInfo &info = state.info;
-  const int depth = int (GST_VIDEO_INFO_COMP_DEPTH (&info, 0));
   StackFormat format{.width = info.width,
       .height = info.height,
-      .bytes = depth / 8,
-      .bits = meta.bits > 0 ? meta.bits : depth,
+      .bytes = int (GST_VIDEO_INFO_COMP_DEPTH (&info, 0)) / 8,
+      .bits = bits_of (picture, info, 0, state.tagged_bits),
       .rate = {info.fps_n, std::max (info.fps_d, 1)}};
   std::string location;
   guint64 classic = 0;
@@ -222,7 +222,7 @@ render (GstBaseSink *sink, GstBuffer *picture) noexcept
     return refuse_buffer (sink, state.info, picture);
   try {
     if (!state.file)
-      open_file (sink, get_frame_meta (picture).value_or (FrameMeta ()));
+      open_file (sink, picture);
     if (state.origin != state.written_origin) {
       state.file->add_origin (state.origin);
       state.written_origin = state.origin;
@@ -276,6 +276,7 @@ on_event (GstBaseSink *sink, GstEvent *event) noexcept
 {
   if (GST_EVENT_TYPE (event) == GST_EVENT_TAG)
     take_origin (state_of (sink), event);
+  follow_tagged_bits (event, state_of (sink).tagged_bits);
   if (GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
     state_of (sink).file.reset (); // what was written does not count
   if (GST_EVENT_TYPE (event) == GST_EVENT_EOS && !finish (sink, true)) {
@@ -314,6 +315,7 @@ start (GstBaseSink *sink) noexcept
     return state.location;
   });
   state.origin.clear ();
+  state.tagged_bits = 0;
   state.is_finished = false;
   return form_of (GST_ELEMENT (sink), location) != nullptr;
 }

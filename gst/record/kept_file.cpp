@@ -88,12 +88,15 @@ write (
 {
   const ObjectPtr<GstElement> pipeline (
       GST_ELEMENT (gst_object_ref_sink (gst_pipeline_new (nullptr))));
-  GstElement *mux =
-      gst_element_factory_make ("codedexposure-recordmux", nullptr);
-  GstElement *sink = gst_element_factory_make ("filesink", nullptr);
+  const auto add = [&pipeline] (const char *factory) {
+    GstElement *made = gst_element_factory_make (factory, nullptr);
+    if (made)
+      gst_bin_add (GST_BIN (pipeline.get ()), made);
+    return made;
+  };
+  GstElement *mux = add ("codedexposure-recordmux"), *sink = add ("filesink");
   if (!mux || !sink)
     return "its elements are not installed.";
-  gst_bin_add_many (GST_BIN (pipeline.get ()), mux, sink, nullptr);
   gst_element_link (mux, sink);
   g_object_set (mux, "threads", 1, "log-location", sidecar.c_str (), nullptr);
   g_object_set (sink, "location", recording.c_str (), nullptr);

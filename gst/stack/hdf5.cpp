@@ -187,6 +187,7 @@ create_file (const std::string &path)
 class Hdf5 : public StackFile
 {
 public:
+  /** With the library locked: if it fails, its objects are closed. */
   Hdf5 (const std::string &path, const StackFormat &format);
   ~Hdf5 () override;
 
@@ -234,7 +235,6 @@ numbers_of (const StackRow &row)
 Hdf5::Hdf5 (const std::string &path, const StackFormat &format)
     : format_ (format)
 {
-  const std::lock_guard lock (library ());
   file_ = create_file (path);
   set_attribute (file_, "format", "codedexposure-stack");
   const int version = 1;
@@ -335,6 +335,7 @@ Hdf5::finish (bool whole)
 std::unique_ptr<StackFile>
 open_hdf5 (const std::string &path, const StackFormat &format)
 {
+  const std::lock_guard lock (library ());
   return std::make_unique<Hdf5> (path, format);
 }
 

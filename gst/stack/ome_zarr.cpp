@@ -15,6 +15,7 @@
 
 #include "base/result.h"
 #include "common/meta.h"
+#include "common/raii.h"
 #include "stack_file.h"
 
 namespace codedexposure::gst
@@ -27,6 +28,8 @@ using Json = nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
 constexpr int kZstdLevel = 1;
+
+using FilePtr = std::unique_ptr<std::FILE, FreeWith<std::fclose>>;
 
 [[noreturn]] void
 fail ()
@@ -85,13 +88,6 @@ public:
     if (!file_)
       fail ();
   }
-  ~Shard ()
-  {
-    if (file_)
-      std::fclose (file_);
-  }
-  Shard (const Shard &) = delete;
-  Shard &operator= (const Shard &) = delete;
 
   bool is_full () const { return next_ == places_.size (); }
   void add (const std::vector<guint8> &picture)
@@ -109,7 +105,7 @@ public:
     }
     append_le (index, crc32c (index), 4);
     write (index);
-    if (std::fclose (std::exchange (file_, nullptr)) != 0 ||
+    if (std::fclose (file_.release ()) != 0 ||
         std::rename ((path_ + kNext).c_str (), path_.c_str ()) != 0)
       fail ();
   }
@@ -117,12 +113,13 @@ public:
 private:
   void write (const std::vector<guint8> &bytes)
   {
-    if (std::fwrite (bytes.data (), 1, bytes.size (), file_) != bytes.size ())
+    if (std::fwrite (bytes.data (), 1, bytes.size (), file_.get ()) !=
+        bytes.size ())
       fail ();
   }
 
   const std::string path_;
-  std::FILE *file_;
+  FilePtr file_;
   std::vector<std::pair<guint64, guint64>> places_; // begin, size
   std::size_t next_ = 0;
   guint64 end_ = 0;
@@ -132,7 +129,6 @@ class OmeZarr : public StackFile
 {
 public:
   OmeZarr (const std::string &path, const StackFormat &format);
-  ~OmeZarr () override;
 
   void add_origin (const std::string &json) override;
   void add (const StackRow &row, const guint8 *pixels, gsize stride) override;
@@ -153,7 +149,7 @@ private:
   std::vector<guint8> packed_, compressed_; // a picture
   std::unique_ptr<Shard> current_;
   std::string times_; // of its pictures, lines of the table
-  std::FILE *table_ = nullptr;
+  FilePtr table_;
 };
 
 /* A kill costs those of the last shard, at most, which is a second at 100
@@ -177,21 +173,15 @@ OmeZarr::OmeZarr (const std::string &path, const StackFormat &format)
     fs::create_directories (path_ + "/0/c", error);
   if (error)
     throw Error{error.message (), ErrorCode::io};
-  table_ = std::fopen ((path_ + "/times.csv").c_str (), "wb");
+  table_.reset (std::fopen ((path_ + "/times.csv").c_str (), "wb"));
   if (!table_ ||
       std::fputs ("picture,pts_ns,duration_ns,exposure_ns,frame,slot,"
                   "synchronised,corrupted,lost_before\n",
-          table_) < 0)
+          table_.get ()) < 0)
     fail ();
   describe_pictures ();
   describe ("unfinished: the program that wrote this folder was killed, or is "
             "still writing it");
-}
-
-OmeZarr::~OmeZarr ()
-{
-  if (table_)
-    std::fclose (table_);
 }
 
 /* The group, with what OME asks for and what is known of the pictures. */
@@ -319,8 +309,8 @@ OmeZarr::finish_shard ()
 {
   current_->finish ();
   current_.reset ();
-  if (std::fputs (std::exchange (times_, "").c_str (), table_) < 0 ||
-      std::fflush (table_) != 0)
+  if (std::fputs (std::exchange (times_, "").c_str (), table_.get ()) < 0 ||
+      std::fflush (table_.get ()) != 0)
     fail ();
   describe_pictures ();
 }
@@ -330,7 +320,7 @@ OmeZarr::finish (bool whole)
 {
   if (current_)
     finish_shard ();
-  if (std::fclose (std::exchange (table_, nullptr)) != 0)
+  if (std::fclose (table_.release ()) != 0)
     fail ();
   describe (whole ? "complete" : kBrokenOff);
 }

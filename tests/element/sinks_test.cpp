@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <string>
 
 #include "common/tag.h"
@@ -183,6 +184,17 @@ TEST_P (StackSink, AFinishedFileIsKept)
   EXPECT_EQ (size (), before);
   EXPECT_EQ (head (), said);
   EXPECT_EQ (text_property (sink->element (), "problem"), "");
+}
+
+TEST_P (StackSink, AFileThatCannotBeBegunIsClosed)
+{
+  fs::create_directories (path + "/0/zarr.json.next"); // a file has this name
+  const auto open_files = [] {
+    return std::ranges::distance (fs::directory_iterator ("/proc/self/fd"));
+  };
+  const auto before = open_files ();
+  EXPECT_EQ (push (0), GST_FLOW_ERROR);
+  EXPECT_EQ (open_files (), before);
 }
 
 TEST_P (StackSink, AFlushBeginsTheFileAnew)

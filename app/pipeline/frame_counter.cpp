@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "common/tag.h"
 #include "pipeline/pads.h"
 
 namespace codedexposure::app
@@ -62,6 +63,16 @@ FrameCounter::FrameCounter (ObjectPtr<GstPad> sink, const PlayTimes &times,
   if (times.shift_to)
     shift_first (
         element ().get (), [to = *times.shift_to] (GstBuffer *) { return to; });
+  add_probe (pad (), GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
+      [this] (GstPad *, GstPadProbeInfo *info) {
+        GstEvent *event = GST_PAD_PROBE_INFO_EVENT (info);
+        const auto setup = GST_EVENT_TYPE (event) == GST_EVENT_TAG
+                               ? setup_from_tags (tags_of (event))
+                               : std::nullopt;
+        if (setup && *setup)
+          tagged_ = setup->value ().schedule.text ();
+        return GST_PAD_PROBE_OK;
+      });
   watch_buffers (
       pad (), [this] (GstPad *, GstBuffer *frame) { count (frame); });
 }
@@ -153,6 +164,25 @@ FrameCounter::count (GstBuffer *frame)
     return;
   frames_++;
   last_ = gint64 (position);
+  follow_schedule ();
+}
+
+void
+FrameCounter::follow_schedule ()
+{
+  if (tagged_ == schedule_)
+    return;
+  const std::string before = std::exchange (schedule_, tagged_);
+  const std::lock_guard lock (mutex_);
+  if (!before.empty ())
+    change_ = "from " + before + " to " + schedule_;
+}
+
+std::string
+FrameCounter::schedule_change () const
+{
+  const std::lock_guard lock (mutex_);
+  return change_;
 }
 
 } // namespace codedexposure::app

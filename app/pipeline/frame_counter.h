@@ -3,7 +3,9 @@
 
 #include <atomic>
 #include <functional>
+#include <mutex>
 #include <optional>
+#include <string>
 
 #include <gst/gst.h>
 
@@ -53,6 +55,9 @@ public:
   /** The share of the stream that was played, of @p total frames if above 0;
    * 0: unknown. */
   double done (gint64 total) const;
+  /** "from A to B": the last two schedules of the frames; empty: they have one.
+   */
+  std::string schedule_change () const;
   /** Ends the stream after the frames that were counted. */
   void end ();
 
@@ -61,13 +66,17 @@ private:
   void hold_first_frame ();
   void seek ();
   void count (GstBuffer *frame);
+  void follow_schedule ();
 
   const gst::ObjectPtr<GstPad> pad_;
   const PlayTimes times_;
   const std::function<void ()> cannot_seek_;
   std::atomic<gint64> frames_ = 0;
   std::atomic<gint64> last_ = -1; // position, ns
-  gulong hold_ = 0; // probe that holds the first frame until the seek
+  std::string tagged_, schedule_; // of the next frame, of the last one
+  mutable std::mutex mutex_;
+  std::string change_; // with the mutex
+  gulong hold_ = 0;    // probe that holds the first frame until the seek
 };
 
 } // namespace codedexposure::app

@@ -241,6 +241,16 @@ is_unfit (const Told &told)
   return told.debug && std::strstr (told.debug.get (), "not-negotiated");
 }
 
+bool
+is_change_of_format (std::string_view kind, const Told &told)
+{
+  const bool of_stack = kind == "codedexposure-stack" &&
+                        g_error_matches (told.error.get (), GST_STREAM_ERROR,
+                            GST_STREAM_ERROR_FORMAT);
+  return of_stack || (told.debug && std::strstr (told.debug.get (),
+                                        "Caps changes are not"));
+}
+
 } // namespace
 
 bool
@@ -269,10 +279,15 @@ told (GstMessage *message)
 }
 
 std::string
-remedy_for (std::string_view kind, const Told &told)
+remedy_for (std::string_view kind, const Told &told, const std::string &change)
 {
   const GError *error = told.error.get ();
   const bool unfit = is_unfit (told);
+  if (!change.empty () && (unfit || is_change_of_format (kind, told)))
+    return "the schedule changes " + change +
+           ", and with it the size or the rate of the pictures, of which a "
+           "file has one; write a folder of pictures (--output NAME/), or each "
+           "part to a file of its own (--excerpt)";
   const bool of_camera =
       kind == "aravissrc" || kind == "codedexposure-camerasrc";
   if (g_error_matches (

@@ -51,8 +51,10 @@ std::string told (GstMessage *message);
  * ends: its camera sent nothing for 2 s. */
 bool is_silence (std::string_view kind, const Told &told);
 /** What the user can do about an error of an element of @p kind; empty: its
- * text says it. */
-std::string remedy_for (std::string_view kind, const Told &told);
+ * text says it.
+ * @p change  of the schedule, "from A to B"; empty: there was none. */
+std::string remedy_for (
+    std::string_view kind, const Told &told, const std::string &change = {});
 
 /** "name: field=value ..." of an element message. */
 std::string fields_of (GstMessage *message);

@@ -307,7 +307,8 @@ Run::on_error (GstMessage *message)
   status_.line ("error: " + text);
   if (error_.text.empty ())
     error_ = {GST_OBJECT_NAME (source), text};
-  const std::string remedy = remedy_for (kind, parts);
+  const std::string remedy =
+      remedy_for (kind, parts, counter_ ? counter_->schedule_change () : "");
   if (!remedy.empty ())
     status_.line (remedy);
   if (recording_ && recording_->has (source)) {

@@ -3,8 +3,10 @@
 
 #include <filesystem>
 #include <regex>
+#include <utility>
 
 #include "pipeline/frame_counter.h"
+#include "pipeline/pads.h"
 
 namespace codedexposure::app
 {
@@ -37,6 +39,28 @@ write_mkv (
   write_file (job, chain, name, frames.get ());
 }
 
+/* The muxer would take other pictures than before, which no player can read. */
+void
+refuse_change (GstElement *encoder)
+{
+  constexpr int kWhat =
+      GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM | GST_PAD_PROBE_TYPE_BUFFER;
+  add_probe (pad_of (encoder, "sink").get (), kWhat,
+      [encoder, refused = false] (GstPad *pad, GstPadProbeInfo *info) mutable {
+        if (GST_PAD_PROBE_INFO_TYPE (info) & GST_PAD_PROBE_TYPE_BUFFER)
+          return refused ? GST_PAD_PROBE_DROP : GST_PAD_PROBE_OK;
+        GstEvent *event = GST_PAD_PROBE_INFO_EVENT (info);
+        const CapsPtr before (gst_pad_get_current_caps (pad));
+        if (GST_EVENT_TYPE (event) != GST_EVENT_CAPS || !before ||
+            gst_caps_is_equal (before.get (), caps_of (event)))
+          return GST_PAD_PROBE_OK;
+        if (!std::exchange (refused, true))
+          GST_ELEMENT_ERROR (encoder, STREAM, FORMAT,
+              ("the size or the rate of the pictures changes"), (nullptr));
+        return GST_PAD_PROBE_DROP;
+      });
+}
+
 /* All players and browsers support 4:2:0 with even sides and values from 16 to
  * 235. From grey, videoconvert would not scale the values, so they go through
  * colour, with 16 bits for exact values. All other modes of x264 spend less on
@@ -59,6 +83,7 @@ write_mp4 (
       .to ("x264enc",
           {{"pass", "quant"}, {"quantizer", 18}, {"vbv-buf-capacity", 0},
               {"speed-preset", "veryfast"}, {"threads", 4}});
+  refuse_change (chain.last ());
   const auto frames = pad_of (chain.last (), "sink");
   chain.to ("mp4mux", {{"fragment-duration", 1000},
                           {"fragment-mode", "first-moov-then-finalise"}});

@@ -6,13 +6,31 @@
 
 #include <nlohmann/json.hpp>
 
+#include "record/matroska.h"
+
 namespace codedexposure::app
 {
+
+namespace
+{
+
+/* What was read is a file whose head lists the tracks of a recording. */
+bool
+has_tracks (const std::string &recording)
+{
+  const auto info = recording_info (recording, false);
+  return info && info->head.video != 0 && info->head.lines != 0;
+}
+
+} // namespace
 
 void
 Run::say_no_frame ()
 {
-  if (damaged_)
+  if (damaged_ && has_tracks (job_.source))
+    status_.line ("error: no coded frame of " + job_.source +
+                  " can be decoded: they are damaged or missing");
+  else if (damaged_)
     status_.line ("error: the head of the stream is damaged, so its tracks "
                   "cannot be found; if ffmpeg reads it, \"ffmpeg -i IN.mkv "
                   "-map 0 -c copy OUT.mkv\" writes a new one");

@@ -263,13 +263,18 @@ check_end (Self *self)
     say_no_track (self);
   if (!state.track.is_linked () || !state.is_complete)
     return;
-  const auto [rest, frames] = state.track.read ([&state] (TrackReader &reader) {
-    auto match = reader.take_rest (Nanoseconds (state.segment.start));
+  const bool is_part = !state.whole && ends_early (state.sink, state.segment);
+  const auto [rest, frames] = state.track.read ([&] (TrackReader &reader) {
+    const auto start = Nanoseconds (state.segment.start);
+    auto match = is_part && !reader.frames ()
+                     ? reader.take_rest (start,
+                           end_of_part (state.segment, state.segment_seqnum))
+                     : reader.take_rest (start);
     return std::pair (std::move (match), reader.frames ());
   });
-  if (!frames && !state.whole && ends_early (state.sink, state.segment))
-    return;
   report_missing (state, rest);
+  if (!frames && is_part)
+    return;
   if (!frames)
     state.damage.stream_cut ();
   else if (state.whole)

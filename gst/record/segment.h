@@ -6,6 +6,7 @@
 
 #include <gst/gst.h>
 
+#include "common/excerpt.h"
 #include "common/raii.h"
 #include "common/structure.h"
 
@@ -21,6 +22,17 @@ ends_early (GstPad *sink, const GstSegment &segment)
          gst_pad_peer_query_duration (sink, GST_FORMAT_TIME, &duration) &&
          gst_segment_to_stream_time (&segment, GST_FORMAT_TIME, segment.stop) <
              guint64 (duration);
+}
+
+/** PTS at which what a seek asked for ends, without the frames around it. */
+inline GstClockTime
+end_of_part (const GstSegment &segment, guint32 seqnum)
+{
+  const auto asked = SeekBook::find (&segment, seqnum);
+  const GstClockTime end = asked ? gst_segment_position_from_stream_time (
+                                       &segment, GST_FORMAT_TIME, asked->stop)
+                                 : GST_CLOCK_TIME_NONE;
+  return std::min (end, segment.stop) - kRounding;
 }
 
 /** A container rounds times to its ticks, and the time of the stream begins

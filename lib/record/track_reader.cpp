@@ -176,8 +176,10 @@ TrackReader::take_now (Nanoseconds pts, Nanoseconds start)
 }
 
 TrackReader::Match
-TrackReader::take_rest (Nanoseconds start)
+TrackReader::take_rest (Nanoseconds start, Nanoseconds until)
 {
+  std::erase_if (
+      lines_, [until] (const Line &line) { return line.pts >= until; });
   return take_until (lines_.end (), start);
 }
 

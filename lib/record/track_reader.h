@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -75,8 +76,9 @@ public:
   std::optional<Match> take (Nanoseconds pts, Nanoseconds start);
   /** The same when no line will be waited for. */
   Match take_now (Nanoseconds pts, Nanoseconds start);
-  /** Frames of the track that did not come. */
-  Match take_rest (Nanoseconds start);
+  /** Frames of the track that did not come, of those before @p until. */
+  Match take_rest (Nanoseconds start,
+      Nanoseconds until = std::numeric_limits<Nanoseconds>::max ());
 
   /** How many frames the last line says the stream has. */
   std::optional<std::uint64_t> frames () const { return frames_; }

@@ -92,6 +92,7 @@ public:
   const std::string &name () const override { return part_.name (); }
   const std::string &part () const override { return part_.path (); }
   bool is_sidecar () const override { return kind_.sidecar; }
+  bool is_folder () const override { return kind_.folder_with; }
   bool is_recording () const override { return kind_.recording; }
 
 private:
@@ -118,6 +119,22 @@ inputs_of (GstElement *pipeline)
         inputs.push_back (text_property (element, property));
   });
   return inputs;
+}
+
+fs::path
+place_of (const std::string &name)
+{
+  std::error_code error;
+  const fs::path whole = fs::absolute (name, error);
+  const fs::path canonical = fs::weakly_canonical (whole, error);
+  return error ? whole : canonical;
+}
+
+bool
+lies_in (const fs::path &place, const fs::path &folder)
+{
+  const fs::path below = place.lexically_relative (folder);
+  return below != "." && *below.begin () != "..";
 }
 
 } // namespace
@@ -195,7 +212,7 @@ Outputs::check (GstElement *pipeline) const
 {
   std::vector<std::string> inputs = inputs_of (pipeline);
   inputs.insert (inputs.end (), inputs_.begin (), inputs_.end ());
-  std::set<std::string> names;
+  std::set<fs::path> places;
   for (const auto &output : outputs_) {
     for (const std::string &written :
         {output->name (), output->name () + ".part"})
@@ -204,13 +221,16 @@ Outputs::check (GstElement *pipeline) const
     if (!output->is_recording ())
       if (auto checked = check_is_no_recording (output->name ()); !checked)
         return checked;
-    std::error_code error;
-    const fs::path whole = fs::absolute (output->name (), error);
-    const fs::path canonical = fs::weakly_canonical (whole, error);
-    if (!names.insert (error ? whole : canonical).second)
-      return Error{
-          output->name () + " is written twice; give each output its own name"};
+    for (const std::string &written : {output->name (), output->table ()})
+      if (!written.empty () && !places.insert (place_of (written)).second)
+        return Error{
+            written + " is written twice; give each output its own name"};
   }
+  for (const auto &output : outputs_)
+    for (const fs::path &place : places)
+      if (output->is_folder () && lies_in (place, place_of (output->name ())))
+        return Error{place.string () + " lies in " + output->name () +
+                     ", which is one output; name a file beside it"};
   return {};
 }
 
@@ -218,16 +238,19 @@ std::vector<std::string>
 Outputs::claim (bool replace)
 {
   std::vector<std::string> errors;
-  std::vector<Output *> claimed;
-  for (const auto &output : outputs_) {
-    Result<void> result = output->check_name (replace);
+  std::vector<Output *> checked, claimed;
+  const auto sort_in = [&errors] (std::vector<Output *> &good, Output *output,
+                           const Result<void> &result) {
     if (result)
-      result = output->claim (replace);
-    if (result)
-      claimed.push_back (output.get ());
+      good.push_back (output);
     else
       errors.push_back (result.error ().message);
-  }
+  };
+  /* A claim makes folders, which are no content of an earlier run. */
+  for (const auto &output : outputs_)
+    sort_in (checked, output.get (), output->check_name (replace));
+  for (Output *output : checked)
+    sort_in (claimed, output, output->claim (replace));
   if (!errors.empty ()) {
     for (Output *output : claimed)
       output->discard ();

@@ -48,6 +48,10 @@ public:
   guint64 frames () const { return frames_; }
   /** Whether it only describes the frames that other outputs have. */
   virtual bool is_sidecar () const { return false; }
+  /** Whether it is a folder to which nothing else is written. */
+  virtual bool is_folder () const { return false; }
+  /** A file that it also writes; empty: none. */
+  virtual std::string table () const { return {}; }
   /** Whether it is a recording, which may replace another one. */
   virtual bool is_recording () const { return false; }
   /** What a shell has to do before the element can write the name itself. */
@@ -85,8 +89,8 @@ public:
    * pass @p coded; @p format: "folder/%06d.png". */
   void pictures (GstElement *sink, GstPad *coded, const std::string &format);
 
-  /** Error if one of them is an input of @p pipeline or a recording, or if two
-   * have the same name. */
+  /** Error if one of them is an input of @p pipeline or a recording, if two
+   * have the same name, or if one lies in another. */
   Result<void> check (GstElement *pipeline) const;
   /** Claims all of them. Errors: why they cannot be written, one for each;
    * nothing is left. */

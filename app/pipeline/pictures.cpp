@@ -259,6 +259,13 @@ Pictures::name_element ()
 }
 
 std::string
+Pictures::table () const
+{
+  const auto names = PictureNames::parse (format_);
+  return names ? names->path (names->table ()) : "";
+}
+
+std::string
 Pictures::preparation () const
 {
   return names_.folder.empty ()

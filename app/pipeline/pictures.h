@@ -44,6 +44,7 @@ public:
   Result<void> check_name (bool replace) override;
   Result<void> claim (bool replace) override;
   void name_element () override;
+  std::string table () const override;
   std::string preparation () const override;
   Result<void> publish () override;
   void discard () override { part_->discard (); }

@@ -396,6 +396,9 @@ Run::on_message (GstMessage *message)
     gchar *code = nullptr, *text = nullptr;
     gst_message_parse_progress (message, &type, &code, &text);
     status_.progress (text ? text : code);
+    if (code == std::string_view ("upload"))
+      uploading_ =
+          type == GST_PROGRESS_TYPE_START || type == GST_PROGRESS_TYPE_CONTINUE;
     g_free (code);
     g_free (text);
     break;
@@ -412,7 +415,8 @@ Run::on_message (GstMessage *message)
 }
 
 /* A camera whose frames are all incomplete posts no error. Frames that wait for
- * a slow disk have come. */
+ * a slow disk have come, and masks that are sent to the DMD trigger none yet.
+ */
 void
 Run::watch_for_silence (gint64 frames)
 {
@@ -421,7 +425,8 @@ Run::watch_for_silence (gint64 frames)
   if (!job_.buffers.empty ())
     g_object_get (
         job_.buffers.front (), "current-level-buffers", &waiting, nullptr);
-  if (std::exchange (frames_before_, frames) != frames || waiting > 0)
+  if (std::exchange (frames_before_, frames) != frames || waiting > 0 ||
+      uploading_)
     heard_ = Clock::now ();
   if (!job_.camera || silent_ || interrupted_ ||
       Clock::now () - heard_ < kSilence)

@@ -79,9 +79,10 @@ private:
   gint64 frames_before_ = -1; // at the last tick
   double cpu_at_start_ = 0;
   bool playing_ = false;
-  bool waiting_ = false; // for a receiver, or to try to connect again
-  bool ending_ = false;  // the stream has ended
-  bool silent_ = false;  // no frame came for a while, and that was said
+  bool waiting_ = false;   // for a receiver, or to try to connect again
+  bool ending_ = false;    // the stream has ended
+  bool silent_ = false;    // no frame came for a while, and that was said
+  bool uploading_ = false; // masks are sent to the DMD
   bool interrupted_ = false;
   bool failed_ = false; // the stream ends because of an error
   struct {

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include <array>
 #include <mutex>
+#include <string>
+#include <string_view>
 #include <utility>
 
 #include <hdf5.h>
@@ -22,6 +24,19 @@ library ()
   return mutex;
 }
 
+/* The reason of the system alone, if @text has one among its addresses and
+ * sizes. */
+std::string
+reason_in (const std::string &text)
+{
+  constexpr std::string_view kBefore = "error message = '";
+  const std::size_t at = text.find (kBefore);
+  if (at == std::string::npos)
+    return text;
+  const std::size_t begin = at + kBefore.size ();
+  return text.substr (begin, text.find ('\'', begin) - begin);
+}
+
 /* The innermost error, which has the reason. */
 [[noreturn]] void
 fail ()
@@ -34,7 +49,7 @@ fail ()
     return herr_t (0);
   };
   H5Ewalk2 (H5E_DEFAULT, H5E_WALK_UPWARD, take, &text);
-  throw Error{text, ErrorCode::io};
+  throw Error{reason_in (text), ErrorCode::io};
 }
 
 void

@@ -89,8 +89,10 @@ Play::played () const
   else if (info.setup)
     schedule = info.setup->schedule;
   else
-    fail (
-        recording_ + " does not say its schedule; set --schedule", Exit::usage);
+    fail (recording_ +
+              " does not say its schedule; set --schedule, or give the "
+              "recording itself if these pictures were decoded from it",
+        Exit::usage);
   Played played;
   played.recording = recording_;
   played.slots = schedule->slots ();

@@ -139,12 +139,15 @@ added (const gchar *debug)
   return end_of_place ? end_of_place + 1 : nullptr;
 }
 
-/* An element names its property, but a script has an option for it. */
+/* An element names its property, but a script has an option for it, and a
+ * command for another element. */
 std::string
 with_options (const char *text)
 {
   static const std::regex property ("[Tt]he (schedule|mapping|bench) property");
-  return std::regex_replace (text, property, "--$1");
+  static const std::regex element ("with moirecalib");
+  return std::regex_replace (std::regex_replace (text, property, "--$1"),
+      element, "with \"codedexposure calibrate\"");
 }
 
 bool

@@ -145,6 +145,12 @@ Options::check_value (const Declared &option) const
     usage_error (option.name + " needs a value, and " + value +
                  " is an option; write a value after " + option.name +
                  ", and a file of that name as ./" + value);
+  if (value.starts_with ("~/"))
+    usage_error (option.name + " " + value +
+                 ": the shell leaves the ~ as it is behind = and in quotes; "
+                 "write " +
+                 option.name + " " + value +
+                 " without them, and a folder of that name as ./" + value);
   if (!option.read (value))
     usage_error (option.name + " must be " + option.must_be + ", not " + value);
 }

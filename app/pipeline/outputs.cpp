@@ -130,6 +130,20 @@ place_of (const std::string &name)
   return error ? whole : canonical;
 }
 
+/* A link stays, and the file that it leads to is written, also if it is not
+ * there yet. One that leads to itself is a file. */
+std::string
+behind_link (const std::string &name)
+{
+  std::error_code error;
+  const fs::path target = fs::read_symlink (name, error);
+  if (error)
+    return name;
+  const fs::path canonical =
+      fs::weakly_canonical (fs::path (name).parent_path () / target, error);
+  return error ? name : canonical.string ();
+}
+
 bool
 lies_in (const fs::path &place, const fs::path &folder)
 {
@@ -193,12 +207,8 @@ Outputs::file (GstElement *element, const char *property,
       pipes_.emplace_back (name, -1);
     return;
   }
-  /* A link stays, and the file that it leads to is replaced. */
-  outputs_.push_back (std::make_unique<File> (element, property,
-      fs::is_symlink (name, ignored)
-          ? fs::weakly_canonical (name, ignored).string ()
-          : name,
-      kind));
+  outputs_.push_back (
+      std::make_unique<File> (element, property, behind_link (name), kind));
 }
 
 void

@@ -9,7 +9,7 @@
     tenth = recording.subframes()[10]
 
 The frames come from the same GStreamer elements as those of the command line,
-so they are equal to what codedexposure-decode writes.
+so they are equal to what "codedexposure decode" writes.
 """
 import importlib
 import os

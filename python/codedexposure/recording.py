@@ -21,7 +21,7 @@ _NOT_OF_SCHEDULE = ("mapping", "size", "rate", "bits", "track", "simulated",
 
 
 def open(path: str | os.PathLike) -> Recording:  # pylint: disable=W0622
-    """Opens a recording, a .mkv file of codedexposure-record or -simulate.
+    """Opens a recording, a .mkv file of "codedexposure record" or "simulate".
 
     Raises OSError if the file cannot be read, and Error if it has no coded
     frame.
@@ -173,7 +173,7 @@ class Recording:
             head = file.read(100000)
         if head[:4] != b"\x1a\x45\xdf\xa3":
             raise Error(f"{self.path} is not a Matroska file; use a recording "
-                        "of codedexposure-record or codedexposure-simulate")
+                        "of 'codedexposure record' or 'codedexposure simulate'")
         codecs = re.findall(rb"[VA]_[A-Z0-9/_]{3,30}|FFV1", head)
         if codecs and not any(b"FFV1" in codec or codec == b"V_UNCOMPRESSED"
                               for codec in codecs):

@@ -308,7 +308,9 @@ class Faults(unittest.TestCase):
             with self.assertRaisesRegex(OSError, "cannot read .*; give the name of"):
                 opened(name)
         (SCRATCH / "text.mkv").write_text("no video")
-        with self.assertRaisesRegex(codedexposure.Error, "not a Matroska file"):
+        with self.assertRaisesRegex(
+                codedexposure.Error,
+                "not a Matroska file; use a recording of 'codedexposure record'"):
             opened("text.mkv")
 
     def test_decoded_before(self):

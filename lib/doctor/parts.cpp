@@ -244,6 +244,12 @@ check_network (Examination &examination, Finding &finding)
   const int gaps = missing_frames (seen, double (rate.period ()));
   const int missing = std::max (0, gaps - damaged);
   const int all = int (seen.size ()) + damaged + missing;
+  if (all == 0) {
+    finding.blame ("no-trigger",
+        "no frame came, so it is not known whether frames are damaged or lost",
+        Verdict::unknown);
+    return {};
+  }
   for (const auto &[name, count] : {std::pair{"damaged frames", damaged},
            std::pair{"missing frames", missing}})
     finding.readings.push_back (

@@ -48,6 +48,19 @@ TEST (PartsCheck, LeavesOtherFaultsToOtherChecks)
         << words;
 }
 
+TEST (PartsCheck, FramesThatDoNotComeAreNotGood)
+{
+  for (const char *words : {"no-trigger", "lose=1"}) {
+    auto rig = SimulatedRig::make (sick_bench (4, words));
+    ASSERT_TRUE (rig);
+    Examination examination{**rig};
+    const auto found = check_parts (examination);
+    ASSERT_TRUE (found);
+    EXPECT_EQ (found->verdict (), Verdict::unknown) << words;
+    EXPECT_EQ (found->diagnoses.at (0).id, "no-trigger") << words;
+  }
+}
+
 TEST (PartsCheck, AMissingPartIsNamedByItsError)
 {
   const auto id = [] (ErrorCode code, bool camera) {

@@ -62,6 +62,7 @@ public:
 private:
   struct Seen {
     RunResult result;
+    bool salvage; // how they were read; another way may read other frames
     std::vector<std::string> lines;
     bool is_sound () const { return result.exit == Exit::done; }
   };
@@ -178,7 +179,7 @@ Pack::look_through (const std::string &file)
     log_frames (chain.last (), lines);
     const RunResult result = play (job);
     if (!result.container_damaged || result.interrupted || salvage)
-      return {result, std::move (lines)};
+      return {result, salvage, std::move (lines)};
   }
 }
 
@@ -274,8 +275,7 @@ Pack::run ()
   Part part (output, Part::kFile,
       whole.parent_path () / ("." + whole.filename ().string () + ".part"));
   value_of (part.claim (true));
-  const RunResult encoded =
-      encode (recording, part.path (), !before.is_sound ());
+  const RunResult encoded = encode (recording, part.path (), before.salvage);
   if (encoded.interrupted)
     give_up (part, "stopped", Exit::interrupted);
   if (encoded.exit != before.result.exit)

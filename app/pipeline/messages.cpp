@@ -320,8 +320,8 @@ remedy_for (std::string_view kind, const Told &told, const std::string &change)
     return "the camera has no such pixel format; set --pixel-format to one "
            "that \"codedexposure camera show\" lists";
   if (is_silence (kind, told))
-    return "the camera sent nothing for 2 s; check that the DMD runs and is "
-           "wired to the camera's trigger line";
+    return "the camera sent nothing for 2 s; check its cable and, if a DMD "
+           "triggers it, that the DMD runs and is wired to its trigger line";
   return {};
 }
 

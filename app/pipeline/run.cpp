@@ -311,6 +311,9 @@ Run::on_error (GstMessage *message)
       remedy_for (kind, parts, counter_ ? counter_->schedule_change () : "");
   if (!remedy.empty ())
     status_.line (remedy);
+  else if (job_.retry && frames () == 0 && error->domain == GST_STREAM_ERROR)
+    status_.line (job_.source + " sends no recording; start \"codedexposure "
+                                "send\" there, or set its --host and --port");
   if (recording_ && recording_->has (source)) {
     status_.line ("the recording ends here; the window goes on");
     recording_->remove ();

@@ -14,16 +14,23 @@ namespace codedexposure::gst::pairs
 namespace
 {
 
-/* The frames of a pad are of the other beam. Returns false. */
+/* Returns false. */
+bool
+refuse (GstCodedExposurePair *self, const std::string &why)
+{
+  POST_ERROR (self, STREAM, WRONG_TYPE, why);
+  state (self).refused = true;
+  return false;
+}
+
+/* The frames of a pad are of the other beam. */
 bool
 refuse_beam (GstCodedExposurePair *self, bool on)
 {
-  POST_ERROR (self, STREAM, WRONG_TYPE,
+  return refuse (self,
       std::string ("The frames of pad ") + (on ? "on" : "off") +
           " are of the beam of the mirrors that are " + (on ? "off" : "on") +
           ". Link them to pad " + (on ? "off" : "on") + ".");
-  state (self).refused = true;
-  return false;
 }
 
 bool
@@ -66,6 +73,8 @@ follow (GstCodedExposurePair *self, bool on, GstEvent *event)
     gst_aggregator_update_segment (GST_AGGREGATOR (self), segment_of (event));
     break;
   case GST_EVENT_TAG:
+    if (const auto why = why_not_coded (event))
+      return refuse (self, *why);
     if (const auto setup = setup_from_tags (tags_of (event)); setup && *setup) {
       if (setup->value ().off_beam == on)
         return refuse_beam (self, on);

@@ -114,8 +114,9 @@ on_tag (Self *self, EventPtr event)
 void
 report_missing (RestoreState &state, const TrackReader::Match &match)
 {
-  state.damage.frames_missing (
-      match.skipped, GstClockTime (match.skipped_from));
+  if (!state.is_unwanted)
+    state.damage.frames_missing (
+        match.skipped, GstClockTime (match.skipped_from));
 }
 
 /* A frame without a line: nothing shows that it is as it was recorded. Without
@@ -261,7 +262,7 @@ check_end (Self *self)
   state.damage.end_sequence ();
   if (state.announced && state.last_frame && !state.found_line)
     say_no_track (self);
-  if (!state.track.is_linked () || !state.is_complete)
+  if (!state.track.is_linked () || !state.is_complete || state.is_unwanted)
     return;
   const bool is_part = !state.whole && ends_early (state.sink, state.segment);
   const auto [rest, frames] = state.track.read ([&] (TrackReader &reader) {
@@ -303,6 +304,7 @@ take_segment (Self *self, EventPtr event)
   state.segment_seqnum = gst_event_get_seqnum (event.get ());
   const auto order = order_of (state.segment);
   state.is_complete = order == TrackReader::Order::all;
+  state.is_unwanted = false;
   state.track.next_segment (event.get (), order);
   state.partners.next_segment (event.get ());
   if (!state.track.is_linked () || tick < 2)
@@ -376,7 +378,9 @@ push_frame (Self *self, BufferPtr frame, const TrackReader::Match &match)
     state.segment.position = GST_BUFFER_PTS (frame.get ());
   if (GST_BUFFER_DURATION_IS_VALID (frame.get ()))
     state.segment.position += GST_BUFFER_DURATION (frame.get ());
-  return gst_pad_push (state.src, frame.release ());
+  const GstFlowReturn pushed = gst_pad_push (state.src, frame.release ());
+  state.is_unwanted |= pushed == GST_FLOW_EOS;
+  return pushed;
 }
 
 /* Frames whose lines are there go on, or all; events follow the frames before

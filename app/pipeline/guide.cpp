@@ -50,7 +50,7 @@ public:
 private:
   gboolean take_key ();
   bool is_done ();
-  Exit judge (bool interrupted);
+  Exit judge (const RunResult &run);
   void end () const
   {
     gst_element_send_event (job_.graph.pipeline (), gst_event_new_eos ());
@@ -69,6 +69,7 @@ private:
   Status status_;
   int readings_ = 0;
   std::string last_reading_;
+  bool tried_ = false; ///< a mapping was begun
   bool mapped_ = false, second_mapped_ = false;
   bool unwritten_ = false; ///< a requested file could not be written
   guint keys_ = 0;         ///< source of keys; 0: no terminal
@@ -81,7 +82,7 @@ Guide::Guide (Job &job, GstElement *calib, GstElement *stage)
   job.ends_by_signal = true;
   job.on_message = [this] (
                        const GstStructure *message) { on_element (message); };
-  job.judge = [this] (const RunResult &run) { return judge (run.interrupted); };
+  job.judge = [this] (const RunResult &run) { return judge (run); };
   const auto on_key = [] (gint, GIOCondition, gpointer self) {
     return static_cast<Guide *> (self)->take_key ();
   };
@@ -132,6 +133,7 @@ Guide::on_state (const std::string &state)
   for (const auto &[name, meaning] : kStates)
     if (state == name)
       status_.line (meaning);
+  tried_ |= state == "mapping";
   if (state == "failed" && keys_ != 0)
     status_.line ("the mapping failed; correct the bench and press Enter to "
                   "try again");
@@ -237,13 +239,17 @@ Guide::on_element (const GstStructure *structure)
 
 /* A signal ends an alignment well. */
 Exit
-Guide::judge (bool interrupted)
+Guide::judge (const RunResult &run)
 {
   if (is_done ())
     return unwritten_ ? Exit::failed : Exit::done;
-  if (interrupted)
+  if (run.interrupted)
     status_.line ("stopped; the mirrors show the schedule again");
-  return interrupted ? Exit::interrupted : Exit::failed;
+  else if (run.exit == Exit::done && !tried_)
+    status_.line (
+        "error: the frames ended before there was a mapping; set more "
+        "--frames, or leave it out");
+  return run.interrupted ? Exit::interrupted : Exit::failed;
 }
 
 } // namespace

@@ -144,10 +144,17 @@ added (const gchar *debug)
 std::string
 with_options (const char *text)
 {
-  static const std::regex property ("[Tt]he (schedule|mapping|bench) property");
-  static const std::regex element ("with moirecalib");
-  return std::regex_replace (std::regex_replace (text, property, "--$1"),
-      element, "with \"codedexposure calibrate\"");
+  static const std::pair<std::regex, const char *> kWords[] = {
+      {std::regex ("[Tt]he (schedule|mapping|bench) property"), "--$1"},
+      {std::regex ("with moirecalib"), "with \"codedexposure calibrate\""},
+      {std::regex ("Link them to (the )?pad o.*"),
+          "Use \"codedexposure decode FIRST.mkv --fuse QUALITY --second "
+          "SECOND.mkv\", whose SECOND.mkv has the beam of the mirrors that are "
+          "off"}};
+  std::string words = text;
+  for (const auto &[of_element, of_command] : kWords)
+    words = std::regex_replace (words, of_element, of_command);
+  return words;
 }
 
 bool

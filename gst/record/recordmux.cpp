@@ -140,6 +140,15 @@ add_muxer (Self *self)
 
 /* ------------------------------------------------------------- branches -- */
 
+/* A check would ask upstream for caps: splitmuxsink starts a muxer while it
+ * holds the pad before it, so that the answer would never come. */
+bool
+link_frames (const Branch &branch, GstPad *sink)
+{
+  return gst_pad_link_full (pad_of (branch.frames, "src").get (), sink,
+             GST_PAD_LINK_CHECK_NOTHING) == GST_PAD_LINK_OK;
+}
+
 /* Frames are hashed and encoded in two threads. Lines are much smaller, and the
  * muxer waits for their frames. */
 void
@@ -179,7 +188,7 @@ add_encoder (GstElement *self, Branch &branch, guint threads)
     return false;
   }
   gst_bin_add (GST_BIN (self), branch.encoder);
-  return gst_element_link (branch.frames, branch.encoder) &&
+  return link_frames (branch, pad_of (branch.encoder, "sink").get ()) &&
          gst_pad_link (pad_of (branch.encoder, "src").get (), branch.video) ==
              GST_PAD_LINK_OK;
 }
@@ -191,8 +200,7 @@ begin_branch (GstElement *self, Branch &branch, const Settings &settings)
   branch.restart ();
   return settings.codec == Codec::ffv1
              ? add_encoder (self, branch, settings.threads)
-             : gst_pad_link (pad_of (branch.frames, "src").get (),
-                   branch.video) == GST_PAD_LINK_OK;
+             : link_frames (branch, branch.video);
 }
 
 void
@@ -284,7 +292,7 @@ follow_caps (GstElement *self, GstEvent *event)
   if (state.has_begun || !branch.encoder || ffv1_keeps (caps_of (event)))
     return;
   remove_part (self, branch.encoder);
-  gst_pad_link (pad_of (branch.frames, "src").get (), branch.video);
+  link_frames (branch, branch.video);
 }
 
 /* The start of a flush comes beside a frame, and touches nothing. */

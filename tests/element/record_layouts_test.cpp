@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-recordmux: frames whose bytes are not laid out as GStreamer
- * does are recorded as their pixels. */
+ * does are recorded as their pixels, and those that come encoded as they are.
+ */
 #include <filesystem>
 
 #include "pipeline.h"
@@ -98,5 +99,26 @@ INSTANTIATE_TEST_SUITE_P (All, RecordLayouts,
         Layout{"DeepLonger", "GRAY16_LE", 64, 48, 0, 0, 100, "codec=raw"},
         Layout{"OneRow", "GRAY8", 64, 1, 32, 0, 100, "codec=ffv1"}),
     [] (const auto &layout) { return layout.param.name; });
+
+TEST (RecordSegments, BeginWhileTheLastOneIsFinished)
+{
+  const std::string path =
+      "/tmp/record_segments_test_" + std::to_string (getpid ()) + "_";
+  EXPECT_EQ (Pipeline ("videotestsrc is-live=true num-buffers=9 ! " +
+                       gray_caps (64, 48, "100/1") +
+                       " ! splitmuxsink async-finalize=true "
+                       "muxer-factory=codedexposure-recordmux "
+                       "max-size-time=30000000 location=" +
+                       path + "%d.mkv")
+                 .play (),
+      "");
+  for (const std::string part : {"0.mkv", "1.mkv", "2.mkv"}) {
+    Pipeline reading ("filesrc location=" + path + part +
+                      " ! codedexposure-recorddemux name=demux ! fakesink");
+    EXPECT_EQ (reading.play (), "");
+    EXPECT_EQ (counter_of (reading["demux"].get (), "frames"), 3u);
+    std::filesystem::remove (path + part);
+  }
+}
 
 } // namespace

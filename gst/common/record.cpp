@@ -123,6 +123,8 @@ record_of (GstBuffer *frame, const GstVideoInfo &info,
     record.saturated = meta ? std::optional (meta->saturated) : std::nullopt;
     return record;
   }
+  if (!info.finfo)
+    return record;
   MappedFrame mapped (info, frame, GST_MAP_READ);
   if (!mapped)
     return record;

@@ -230,6 +230,7 @@ set_caps (GstBaseTransform *base, GstCaps *caps, GstCaps *)
 {
   LogState &state = state_in<GstCodedExposureLog> (base);
   state.is_raw = !is_encoded (caps);
+  state.info = {};
   return !state.is_raw || gst_video_info_from_caps (&state.info, caps);
 }
 

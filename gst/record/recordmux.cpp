@@ -289,10 +289,27 @@ follow_caps (GstElement *self, GstEvent *event)
 {
   auto &state = state_in<Self> (self);
   Branch &branch = state.coded;
+  if (is_encoded (caps_of (event)) &&
+      settings_of (as<Self> (self)).codec != Codec::copy)
+    POST_ERROR (self, STREAM, FORMAT,
+        "The frames are encoded already. Set codec=copy to record them as they "
+        "come, or decode them before this element.");
   if (state.has_begun || !branch.encoder || ffv1_keeps (caps_of (event)))
     return;
   remove_part (self, branch.encoder);
   link_frames (branch, branch.video);
+}
+
+/* All are taken, so that follow_caps () says what is wrong. */
+GstPadProbeReturn
+take_caps_query (GstPadProbeInfo *info)
+{
+  GstQuery *query = GST_PAD_PROBE_INFO_QUERY (info);
+  if (GST_QUERY_TYPE (query) != GST_QUERY_CAPS ||
+      !(GST_PAD_PROBE_INFO_TYPE (info) & GST_PAD_PROBE_TYPE_PUSH))
+    return GST_PAD_PROBE_OK;
+  answer_caps (query, CapsPtr (gst_caps_from_string (kPartCaps)));
+  return GST_PAD_PROBE_HANDLED;
 }
 
 /* The start of a flush comes beside a frame, and touches nothing. */
@@ -301,8 +318,10 @@ on_input (GstPad *, GstPadProbeInfo *info, gpointer data) noexcept
 {
   auto *self = as<GstElement> (data);
   auto &state = state_in<Self> (self);
-  const bool is_frame =
-      GST_PAD_PROBE_INFO_TYPE (info) & GST_PAD_PROBE_TYPE_BUFFER;
+  const auto type = GST_PAD_PROBE_INFO_TYPE (info);
+  if (type & GST_PAD_PROBE_TYPE_QUERY_DOWNSTREAM)
+    return take_caps_query (info);
+  const bool is_frame = type & GST_PAD_PROBE_TYPE_BUFFER;
   GstEvent *event = is_frame ? nullptr : GST_PAD_PROBE_INFO_EVENT (info);
   if (event && GST_EVENT_TYPE (event) == GST_EVENT_FLUSH_STOP)
     state.was_flushed = state.has_begun;
@@ -439,9 +458,9 @@ set_up_instance (Self *self)
   add_muxer (self);
   add_branch (GST_ELEMENT (self), state.coded);
   gst_pad_add_probe (pad_of (state.coded.log, "sink").get (),
-      GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER |
-                       GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM |
-                       GST_PAD_PROBE_TYPE_EVENT_FLUSH),
+      GstPadProbeType (
+          GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM |
+          GST_PAD_PROBE_TYPE_EVENT_FLUSH | GST_PAD_PROBE_TYPE_QUERY_DOWNSTREAM),
       on_input, self, nullptr);
   state.sink = add_ghost_pad (GST_ELEMENT (self), "sink", state.coded.log);
   gst_pad_set_event_function (

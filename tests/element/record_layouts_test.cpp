@@ -100,6 +100,24 @@ INSTANTIATE_TEST_SUITE_P (All, RecordLayouts,
         Layout{"OneRow", "GRAY8", 64, 1, 32, 0, 100, "codec=ffv1"}),
     [] (const auto &layout) { return layout.param.name; });
 
+std::string
+record_encoded (const std::string &codec, const std::string &to)
+{
+  return Pipeline ("videotestsrc num-buffers=3 ! " + gray_caps (64, 48) +
+                   " ! avenc_ffv1 ! codedexposure-recordmux codec=" + codec +
+                   " ! " + to)
+      .play ();
+}
+
+TEST (RecordEncoded, TheyAreCopiedOrRefused)
+{
+  const std::string reader = "codedexposure-recorddemux ! fakesink";
+  EXPECT_EQ (record_encoded ("copy", reader), "");
+  for (const std::string codec : {"ffv1", "raw"})
+    EXPECT_NE (
+        record_encoded (codec, reader).find ("codec=copy"), std::string::npos);
+}
+
 TEST (RecordSegments, BeginWhileTheLastOneIsFinished)
 {
   const std::string path =

@@ -83,6 +83,12 @@ struct CodedFormat {
   CapsPtr resized (Extent other) const;
 };
 
+/** The coded frame before another, whose caps may differ. */
+struct FrameBefore {
+  GstClockTime pts = GST_CLOCK_TIME_NONE; ///< none: not known
+  FrameRate rate = {};
+};
+
 /** A coded frame that was admitted. */
 struct CodedFrame {
   BufferPtr buffer;
@@ -92,8 +98,7 @@ struct CodedFrame {
   bool follows;
   /** In the part that a seek asked for. */
   Place place = Place::inside;
-  /** PTS of the frame before; none: not known. */
-  GstClockTime before = GST_CLOCK_TIME_NONE;
+  FrameBefore before = {};
 
   GstClockTime pts () const { return GST_BUFFER_PTS (buffer.get ()); }
   /** PTS of its picture @p k of @p n. */
@@ -387,9 +392,9 @@ private:
     std::vector<EventPtr> pending;
     std::optional<FrameSequence> sequence;
     GstClockTime last_pts = GST_CLOCK_TIME_NONE;
-    GstClockTime before = GST_CLOCK_TIME_NONE; ///< last_pts, if time goes on
-    bool was_late = false;                     ///< the last frame was
-    bool is_recorded = false;                  ///< kRecordedEvent came
+    FrameBefore before;       ///< with last_pts, if time goes on
+    bool was_late = false;    ///< the last frame was
+    bool is_recorded = false; ///< kRecordedEvent came
     /** PTS of a recorded frame, from its exposure on; all have the same. */
     std::optional<GstClockTimeDiff> moved;
     /** Until when upstream has said that frames are missing. */

@@ -267,7 +267,7 @@ CodedFilter::break_time ()
     stream_.sequence->resync ();
   stream_.moved.reset ();
   stream_.missing_until = 0;
-  stream_.before = GST_CLOCK_TIME_NONE;
+  stream_.before = {};
   break_history ();
   each_pad ([this] (GstCodedPad *pad) {
     pad->state.discont = true;

@@ -37,9 +37,10 @@ CodedFrame::pts_of (int k, int n, FrameRate rate) const
   const auto own = [&] (int i) {
     return pts () + GstClockTime (rate.time_of (0, i, n));
   };
-  if (!GST_CLOCK_TIME_IS_VALID (before) || pts () <= before)
+  if (!GST_CLOCK_TIME_IS_VALID (before.pts) || pts () <= before.pts)
     return own (k);
-  const GstClockTime last = before + GstClockTime (rate.time_of (0, n - 1, n));
+  const GstClockTime last =
+      before.pts + GstClockTime (before.rate.time_of (0, n - 1, n));
   if (own (k) > last)
     return own (k);
   int late = k + 1;
@@ -322,7 +323,7 @@ CodedFilter::admit (BufferPtr frame)
                        !GST_BUFFER_IS_DISCONT (frame.get ());
   counted.lost_before = step.lost;
   return {std::move (frame), known.value_or (counted), follows, place,
-      std::exchange (stream_.before, pts)};
+      std::exchange (stream_.before, {pts, format ().rate})};
 }
 
 void

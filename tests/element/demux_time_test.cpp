@@ -273,6 +273,20 @@ TEST_F (DemuxTime, NumbersGoOnWhenTheRateChanges)
   EXPECT_EQ (frame_numbers (), (std::vector<guint64>{0, 1, 2, 5}));
 }
 
+TEST_F (DemuxTime, FramesOfASlowerRateKeepTheirTimes)
+{
+  start ("schedule=sequential:2x2", "50/1");
+  push_all ({0, 20});
+  demux->push_event (
+      gst_event_new_caps (caps_of (gray_caps (16, 16, "25/1")).get ()));
+  push (40 * kMs);
+  std::vector<GstClockTime> shown; // ms
+  for (const BufferPtr &buffer : pull_all ())
+    shown.push_back (pts_of (buffer) / kMs);
+  EXPECT_EQ (shown, (std::vector<GstClockTime>{
+                        0, 5, 10, 15, 20, 25, 30, 35, 40, 50, 60, 70}));
+}
+
 TEST_F (DemuxTime, FrameWithoutTimeStampIsAnError)
 {
   start ();

@@ -46,6 +46,7 @@
  * Since: 0.2
  */
 #include <algorithm>
+#include <array>
 #include <string>
 #include <utility>
 #include <vector>
@@ -283,12 +284,32 @@ follow_tags (GstElement *self, GstEvent *event)
     add_partner (self);
 }
 
+bool
+is_other_video (const GstCaps *before, const GstCaps *after)
+{
+  const GstStructure *old = gst_caps_get_structure (before, 0);
+  const GstStructure *own = gst_caps_get_structure (after, 0);
+  constexpr std::array kFixed = {"format", "width", "height", "framerate"};
+  return std::ranges::any_of (kFixed, [&] (const char *name) {
+    const GValue *was = gst_structure_get_value (old, name);
+    const GValue *is = gst_structure_get_value (own, name);
+    return was && is && gst_value_compare (was, is) != GST_VALUE_EQUAL;
+  });
+}
+
 /* What FFV1 cannot keep is kept raw. */
 void
 follow_caps (GstElement *self, GstEvent *event)
 {
   auto &state = state_in<Self> (self);
   Branch &branch = state.coded;
+  const CapsPtr before (
+      gst_pad_get_current_caps (pad_of (branch.log, "sink").get ()));
+  if (state.has_begun && before &&
+      is_other_video (before.get (), caps_of (event)))
+    POST_ERROR (self, STREAM, FORMAT,
+        "The format, the size or the rate of the frames changes, but a "
+        "recording has one for all. Begin another recording.");
   if (is_encoded (caps_of (event)) &&
       settings_of (as<Self> (self)).codec != Codec::copy)
     POST_ERROR (self, STREAM, FORMAT,

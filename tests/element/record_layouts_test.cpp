@@ -118,6 +118,18 @@ TEST (RecordEncoded, TheyAreCopiedOrRefused)
         record_encoded (codec, reader).find ("codec=copy"), std::string::npos);
 }
 
+TEST (RecordedFrames, OfAnotherRateAreAnErrorThatSaysSo)
+{
+  const std::string frames = "videotestsrc num-buffers=3 ! ";
+  EXPECT_NE (
+      Pipeline (frames + gray_caps (64, 48, "25/1") +
+                " ! concat name=all ! codedexposure-recordmux ! fakesink " +
+                frames + gray_caps (64, 48, "50/1") + " ! all.")
+          .play ()
+          .find ("Begin another recording"),
+      std::string::npos);
+}
+
 TEST (RecordSegments, BeginWhileTheLastOneIsFinished)
 {
   const std::string path =

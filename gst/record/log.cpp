@@ -24,6 +24,7 @@
 #include "partner_output.h"
 #include "parts.h"
 #include "record/track.h"
+#include "segment.h"
 
 using namespace codedexposure;
 using namespace codedexposure::gst;
@@ -196,6 +197,15 @@ count_lost (GstCodedExposureLog *self, FrameRecord &record)
   state.frames_lost -= comes_late (state, record) ? 1 : 0;
 }
 
+/* The encoder would give it the time of the segment, and the muxer drop its
+ * line. */
+bool
+begins_before (const GstSegment &segment, GstBuffer *frame)
+{
+  return segment.rate > 0 && GST_BUFFER_PTS_IS_VALID (frame) &&
+         GST_BUFFER_PTS (frame) < segment.start;
+}
+
 GstFlowReturn
 transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
 {
@@ -203,6 +213,8 @@ transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
   LogState &state = self->state;
   if (state.is_raw && !holds_frame (base, state.info, frame))
     return GST_FLOW_ERROR;
+  if (begins_before (base->segment, frame))
+    return GST_BASE_TRANSFORM_FLOW_DROPPED;
   const int pilot = state.setup ? state.setup->schedule.pilot_rows () : 0;
   FrameRecord record =
       record_of (frame, state.info, base->segment, pilot, state.frames++);
@@ -318,6 +330,20 @@ begin_anew (GstCodedExposureLog *self)
   return has_file;
 }
 
+/* The last frame may end after the segment, and the last line is behind it. All
+ * that comes is recorded. Transfer: full, of both. */
+GstEvent *
+open_end (GstEvent *event)
+{
+  GstSegment segment = *segment_of (event);
+  if (segment.rate < 0)
+    return event;
+  segment.stop = GST_CLOCK_TIME_NONE;
+  EventPtr open = segment_event (segment, gst_event_get_seqnum (event));
+  gst_event_unref (event);
+  return open.release ();
+}
+
 gboolean
 sink_event (GstBaseTransform *base, GstEvent *event) noexcept
 {
@@ -334,6 +360,7 @@ sink_event (GstBaseTransform *base, GstEvent *event) noexcept
     break;
   case GST_EVENT_SEGMENT:
     restart_track (state, false);
+    event = open_end (event);
     break;
   case GST_EVENT_FLUSH_STOP:
     begin_anew (self);

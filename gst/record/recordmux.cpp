@@ -20,6 +20,9 @@
  * With #codedexposure-recordmux:streamable, the bytes are for a network:
  * without an index, and receivers can join late.
  *
+ * A frame that begins before the segment, as after a seek to within it, is not
+ * recorded; one that ends after the segment is.
+ *
  * A flush, which a seek may bring, begins another recording: with the frames
  * after it, in place of those before.
  *

@@ -2,8 +2,10 @@
 /* codedexposure-recordmux: frames whose bytes are not laid out as GStreamer
  * does are recorded as their pixels, and those that come encoded as they are.
  */
+#include <atomic>
 #include <filesystem>
 
+#include "common/messages.h"
 #include "pipeline.h"
 
 namespace
@@ -128,6 +130,52 @@ TEST (RecordedFrames, OfAnotherRateAreAnErrorThatSaysSo)
           .play ()
           .find ("Begin another recording"),
       std::string::npos);
+}
+
+/* From 15 ms to 45 ms. */
+GstPadProbeReturn
+cut_segment (GstPad *, GstPadProbeInfo *info, gpointer) noexcept
+{
+  GstEvent *event = GST_PAD_PROBE_INFO_EVENT (info);
+  if (GST_EVENT_TYPE (event) != GST_EVENT_SEGMENT)
+    return GST_PAD_PROBE_OK;
+  GstSegment segment;
+  gst_event_copy_segment (event, &segment);
+  gst_event_unref (event);
+  segment.start = segment.time = 15 * GST_MSECOND;
+  segment.stop = 45 * GST_MSECOND;
+  info->data = gst_event_new_segment (&segment);
+  return GST_PAD_PROBE_OK;
+}
+
+TEST (RecordedFrames, OfASegmentThatCutsTwoAreWhole)
+{
+  for (const std::string codec : {"ffv1", "raw"}) {
+    Pipeline pipeline (
+        "videotestsrc num-buffers=5 ! " + gray_caps (64, 48, "100/1") +
+        " ! identity name=cut ! codedexposure-recordmux codec=" + codec +
+        " ! codedexposure-recorddemux name=demux ! fakesink");
+    gst_pad_add_probe (pipeline.pad ("cut", "src").get (),
+        GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, cut_segment, nullptr, nullptr);
+    std::atomic<bool> is_cut = false;
+    const ObjectPtr<GstElement> demux = pipeline["demux"];
+    const ObjectPtr<GstElement> top (
+        GST_ELEMENT (gst_object_get_parent (GST_OBJECT (demux.get ()))));
+    const ObjectPtr<GstBus> bus (gst_element_get_bus (top.get ()));
+    gst_bus_set_sync_handler (
+        bus.get (),
+        [] (GstBus *, GstMessage *message, gpointer data) {
+          if (parse_message<StreamCut> (message))
+            *static_cast<std::atomic<bool> *> (data) = true;
+          return GST_BUS_PASS;
+        },
+        &is_cut, nullptr);
+    EXPECT_EQ (pipeline.play (), "");
+    EXPECT_EQ (counter_of (demux.get (), "frames"), 3u);
+    EXPECT_EQ (counter_of (demux.get (), "frames-unknown"), 0u);
+    EXPECT_EQ (counter_of (demux.get (), "frames-missing"), 0u);
+    EXPECT_FALSE (is_cut);
+  }
 }
 
 TEST (RecordSegments, BeginWhileTheLastOneIsFinished)

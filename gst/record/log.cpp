@@ -202,7 +202,7 @@ count_lost (GstCodedExposureLog *self, FrameRecord &record)
 bool
 begins_before (const GstSegment &segment, GstBuffer *frame)
 {
-  return segment.rate > 0 && GST_BUFFER_PTS_IS_VALID (frame) &&
+  return GST_BUFFER_PTS_IS_VALID (frame) &&
          GST_BUFFER_PTS (frame) < segment.start;
 }
 
@@ -212,6 +212,8 @@ transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
   auto *self = as<GstCodedExposureLog> (base);
   LogState &state = self->state;
   if (state.is_raw && !holds_frame (base, state.info, frame))
+    return GST_FLOW_ERROR;
+  if (base->segment.rate < 0)
     return GST_FLOW_ERROR;
   if (begins_before (base->segment, frame))
     return GST_BASE_TRANSFORM_FLOW_DROPPED;
@@ -333,11 +335,15 @@ begin_anew (GstCodedExposureLog *self)
 /* The last frame may end after the segment, and the last line is behind it. All
  * that comes is recorded. Transfer: full, of both. */
 GstEvent *
-open_end (GstEvent *event)
+open_end (GstCodedExposureLog *self, GstEvent *event)
 {
   GstSegment segment = *segment_of (event);
-  if (segment.rate < 0)
+  if (segment.rate < 0) {
+    POST_ERROR (self, STREAM, FORMAT,
+        "The frames come backwards, but a recording has them in the order of "
+        "time. Record them while they are played forwards.");
     return event;
+  }
   segment.stop = GST_CLOCK_TIME_NONE;
   EventPtr open = segment_event (segment, gst_event_get_seqnum (event));
   gst_event_unref (event);
@@ -360,7 +366,7 @@ sink_event (GstBaseTransform *base, GstEvent *event) noexcept
     break;
   case GST_EVENT_SEGMENT:
     restart_track (state, false);
-    event = open_end (event);
+    event = open_end (self, event);
     break;
   case GST_EVENT_FLUSH_STOP:
     begin_anew (self);

@@ -21,7 +21,8 @@
  * without an index, and receivers can join late.
  *
  * A frame that begins before the segment, as after a seek to within it, is not
- * recorded; one that ends after the segment is.
+ * recorded; one that ends after the segment is. Frames that come backwards are
+ * refused.
  *
  * A flush, which a seek may bring, begins another recording: with the frames
  * after it, in place of those before.

@@ -132,9 +132,9 @@ TEST (RecordedFrames, OfAnotherRateAreAnErrorThatSaysSo)
       std::string::npos);
 }
 
-/* From 15 ms to 45 ms. */
+/* From 15 ms to 45 ms, at the @rate, a double. */
 GstPadProbeReturn
-cut_segment (GstPad *, GstPadProbeInfo *info, gpointer) noexcept
+cut_segment (GstPad *, GstPadProbeInfo *info, gpointer rate) noexcept
 {
   GstEvent *event = GST_PAD_PROBE_INFO_EVENT (info);
   if (GST_EVENT_TYPE (event) != GST_EVENT_SEGMENT)
@@ -142,6 +142,7 @@ cut_segment (GstPad *, GstPadProbeInfo *info, gpointer) noexcept
   GstSegment segment;
   gst_event_copy_segment (event, &segment);
   gst_event_unref (event);
+  segment.rate = *static_cast<const double *> (rate);
   segment.start = segment.time = 15 * GST_MSECOND;
   segment.stop = 45 * GST_MSECOND;
   info->data = gst_event_new_segment (&segment);
@@ -150,13 +151,14 @@ cut_segment (GstPad *, GstPadProbeInfo *info, gpointer) noexcept
 
 TEST (RecordedFrames, OfASegmentThatCutsTwoAreWhole)
 {
+  double forwards = 1;
   for (const std::string codec : {"ffv1", "raw"}) {
     Pipeline pipeline (
         "videotestsrc num-buffers=5 ! " + gray_caps (64, 48, "100/1") +
         " ! identity name=cut ! codedexposure-recordmux codec=" + codec +
         " ! codedexposure-recorddemux name=demux ! fakesink");
     gst_pad_add_probe (pipeline.pad ("cut", "src").get (),
-        GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, cut_segment, nullptr, nullptr);
+        GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, cut_segment, &forwards, nullptr);
     std::atomic<bool> is_cut = false;
     const ObjectPtr<GstElement> demux = pipeline["demux"];
     const ObjectPtr<GstElement> top (
@@ -176,6 +178,18 @@ TEST (RecordedFrames, OfASegmentThatCutsTwoAreWhole)
     EXPECT_EQ (counter_of (demux.get (), "frames-missing"), 0u);
     EXPECT_FALSE (is_cut);
   }
+}
+
+TEST (RecordedFrames, ThatComeBackwardsAreAnErrorThatSaysSo)
+{
+  double backwards = -1;
+  Pipeline pipeline ("videotestsrc num-buffers=5 ! " +
+                     gray_caps (64, 48, "100/1") +
+                     " ! identity name=cut ! codedexposure-recordmux "
+                     "! fakesink");
+  gst_pad_add_probe (pipeline.pad ("cut", "src").get (),
+      GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, cut_segment, &backwards, nullptr);
+  EXPECT_NE (pipeline.play ().find ("played forwards"), std::string::npos);
 }
 
 TEST (RecordSegments, BeginWhileTheLastOneIsFinished)

@@ -479,6 +479,7 @@ private:
   void count (guint64 CodedCounters::*counter, guint64 by = 1);
 
   void settle_events ();
+  void settle_at_end ();
   gboolean forward_in_turn (EventPtr event);
   gboolean on_stream_start (EventPtr event);
   gboolean on_caps (const EventPtr &event);

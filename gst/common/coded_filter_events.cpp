@@ -82,6 +82,15 @@ CodedFilter::settle_events ()
   }
 }
 
+/* Muxers need caps even if no frame came. */
+void
+CodedFilter::settle_at_end ()
+{
+  if (stream_.caps && !has_format ())
+    negotiate ();
+  settle_events ();
+}
+
 gboolean
 CodedFilter::forward_in_turn (EventPtr event)
 {
@@ -218,7 +227,7 @@ CodedFilter::on_gap (EventPtr event)
 gboolean
 CodedFilter::on_segment_done (EventPtr event)
 {
-  settle_events ();
+  settle_at_end ();
   GstSegment &segment = stream_.segment;
   const GstClockTime end = segment.rate > 0 ? segment.stop : segment.start;
   if (stream_.excerpt && GST_CLOCK_TIME_IS_VALID (end)) {
@@ -230,14 +239,11 @@ CodedFilter::on_segment_done (EventPtr event)
   return forward (std::move (event));
 }
 
-/* Muxers need caps even if no frame came. */
 gboolean
 CodedFilter::on_eos (EventPtr event)
 {
   end_saturation ();
-  if (stream_.caps && !has_format ())
-    negotiate ();
-  settle_events ();
+  settle_at_end ();
   return forward (std::move (event));
 }
 

@@ -477,4 +477,13 @@ TEST (DemuxCaps, EventsComeInTheOrderThatDownstreamNeeds)
                         GST_EVENT_CAPS, GST_EVENT_SEGMENT, GST_EVENT_TAG}));
 }
 
+TEST (DemuxCaps, ASegmentWithoutFramesIsThereBeforeItIsDone)
+{
+  ElementHarness demux ("codedexposure-demux schedule=sequential:2x2");
+  demux.set_caps (gray_caps (16, 8));
+  demux.push_event (gst_event_new_segment_done (GST_FORMAT_TIME, 0));
+  EXPECT_TRUE (demux.pull_event (GST_EVENT_SEGMENT));
+  EXPECT_TRUE (demux.pull_event (GST_EVENT_SEGMENT_DONE));
+}
+
 } // namespace

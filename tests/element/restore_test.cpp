@@ -1,17 +1,14 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* The parts log and restore: what was written beside frames is on them again,
  * and what is not as it was recorded is CORRUPTED. */
-#include "harness.h"
+#include "restored.h"
 
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "common/messages.h"
-#include "common/meta.h"
-#include "common/tag.h"
 #include "record/track.h"
-#include "recorded.h"
 
 namespace
 {
@@ -19,103 +16,6 @@ namespace
 using namespace codedexposure;
 using namespace codedexposure::gst;
 using namespace codedexposure::test;
-
-/** kFrames frames: the third is CORRUPTED, late ones are DISCONT. */
-struct Recording {
-  std::vector<BufferPtr> frames, lines;
-
-  explicit Recording (const std::vector<int> &order = {0, 1, 2, 3, 4, 5},
-      const std::vector<guint64> &numbers = {})
-  {
-    /* The file lets it start before the pad is requested. */
-    ElementHarness log ("part-log location=/dev/null");
-    log.request ("track");
-    log.set_caps (gray_caps (8, 8));
-    log.push_event (setup_to_event (setup_of ("staircase:2x2")));
-    for (int last = 0; const int i : order) {
-      BufferPtr frame = picture (i);
-      if (std::exchange (last, std::max (last, i)) > i)
-        GST_BUFFER_FLAG_SET (frame.get (), GST_BUFFER_FLAG_DISCONT);
-      FrameMeta meta = meta_of (i);
-      meta.frame = numbers.empty () ? meta.frame : numbers[std::size_t (i)];
-      set_frame_meta (frame.get (), meta);
-      if (i == 2)
-        GST_BUFFER_FLAG_SET (frame.get (), GST_BUFFER_FLAG_CORRUPTED);
-      EXPECT_EQ (log.push (std::move (frame)), GST_FLOW_OK);
-      frames.push_back (picture (i));
-    }
-    log.push_event (gst_event_new_eos ());
-    while (BufferPtr line = log.pull ("track"))
-      lines.push_back (std::move (line));
-    EXPECT_EQ (lines.size (), std::size_t (kFrames + 1));
-  }
-};
-
-class Restore : public ::testing::Test
-{
-protected:
-  Restore ()
-  {
-    track.reset (
-        gst_harness_new_with_element (file.element (), "track", nullptr));
-    gst_harness_set_src_caps_str (track.get (), "text/x-raw,format=utf8");
-    file.set_caps (gray_caps (8, 8));
-  }
-  void push_line (int i)
-  {
-    gst_harness_push (
-        track.get (), recording.lines[std::size_t (i)].release ());
-  }
-  GstFlowReturn push_frame (int i)
-  {
-    return file.push (std::move (recording.frames[std::size_t (i)]));
-  }
-  void end ()
-  {
-    gst_harness_push_event (track.get (), gst_event_new_eos ());
-    file.push_event (gst_event_new_eos ());
-  }
-  /** All frames and lines, but the named ones. */
-  void play (int without_frame = -1, int without_line = -1)
-  {
-    for (int i = 0; i <= kFrames; i++) {
-      if (i != without_line)
-        push_line (i);
-      if (i < kFrames && i != without_frame)
-        push_frame (i);
-    }
-    end ();
-    while (BufferPtr frame = file.pull ())
-      restored.push_back (std::move (frame));
-  }
-  bool corrupted (int i) const
-  {
-    return GST_BUFFER_FLAG_IS_SET (
-        restored.at (std::size_t (i)).get (), GST_BUFFER_FLAG_CORRUPTED);
-  }
-  /** The setup in the tags that came out last. */
-  std::optional<StreamSetup> setup ()
-  {
-    std::optional<StreamSetup> last;
-    while (const EventPtr event = file.pull_event (GST_EVENT_TAG)) {
-      GstTagList *tags = nullptr;
-      gst_event_parse_tag (event.get (), &tags);
-      if (const auto setup = setup_from_tags (tags); setup && *setup)
-        last = setup->value ();
-    }
-    return last;
-  }
-  std::string schedule ()
-  {
-    const auto last = setup ();
-    return last ? last->schedule.text () : "";
-  }
-
-  Recording recording;
-  ElementHarness file{"part-restore"};
-  HarnessPtr track;
-  std::vector<BufferPtr> restored;
-};
 
 TEST_F (Restore, EverythingThatWasKnownIsKnownAgain)
 {
@@ -249,131 +149,6 @@ TEST_F (Restore, FramesThatAreMissingWithTheirLinesAreSaid)
   EXPECT_FALSE (file.posted<FramesMissing> ());
 }
 
-GstEvent *
-segment_from (GstClockTime start, GstClockTime stream_time)
-{
-  GstSegment segment;
-  gst_segment_init (&segment, GST_FORMAT_TIME);
-  segment.start = start;
-  segment.time = stream_time;
-  return gst_event_new_segment (&segment);
-}
-
-/* A demuxer was stopped between a frame and its line, and has read on before
- * the frames get there. If it is sent to that frame, it goes on behind it. */
-TEST_F (Restore, ASeekWithoutAFlushLeavesTheFrameWhoseLineHasNotCome)
-{
-  Recording again;
-  push_line (0);
-  push_frame (0);
-  push_frame (2);
-  gst_harness_push_event (track.get (), segment_from (0, 0));
-  for (int i = 1; i < kFrames - 1; i++)
-    push_line (i);
-  EXPECT_FALSE (file.pull () && file.pull ()) << "the second one waits";
-  file.push_event (segment_from (0, 0));
-  for (int i = 1; i < kFrames; i++)
-    file.push (std::move (again.frames[std::size_t (i)]));
-  gst_harness_push_event (track.get (), segment_from (5 * kPeriod, 0));
-  file.push_event (segment_from (5 * kPeriod, 0));
-  push_line (5);
-  end ();
-  int next = 1;
-  while (const BufferPtr frame = file.pull ())
-    EXPECT_EQ (GST_BUFFER_PTS (frame.get ()), GstClockTime (next++) * kPeriod);
-  EXPECT_EQ (next, kFrames);
-  EXPECT_EQ (counted (file.element (), "frames-unknown"), 0u);
-  EXPECT_EQ (counted (file.element (), "frames-missing"), 0u);
-}
-
-/* The demuxer was sent to a frame, and had read it before it stopped. */
-TEST_F (Restore, AFrameThatASeekWithoutAFlushGoesBackToIsThereOnce)
-{
-  Recording again;
-  push_line (0);
-  push_frame (0);
-  push_frame (1);
-  gst_harness_push_event (track.get (), segment_from (kPeriod, 0));
-  file.push_event (segment_from (kPeriod, 0));
-  for (int i = 1; i < kFrames; i++) {
-    file.push (std::move (again.frames[std::size_t (i)]));
-    push_line (i);
-  }
-  end ();
-  int next = 0;
-  while (const BufferPtr frame = file.pull ())
-    EXPECT_EQ (GST_BUFFER_PTS (frame.get ()), GstClockTime (next++) * kPeriod);
-  EXPECT_EQ (next, kFrames);
-  EXPECT_EQ (counted (file.element (), "frames-unknown"), 0u);
-  EXPECT_EQ (counted (file.element (), "frames-missing"), 0u);
-}
-
-/* It read a further one before it stopped, and goes on behind it. */
-TEST_F (Restore, AFrameThatASeekWithoutAFlushGoesOnBehindIsThere)
-{
-  push_line (0);
-  push_frame (0);
-  push_frame (1);
-  gst_harness_push_event (track.get (), segment_from (0, 0));
-  file.push_event (segment_from (0, 0));
-  for (int i = 1; i < kFrames; i++) {
-    push_line (i);
-    if (i + 1 < kFrames)
-      push_frame (i + 1);
-  }
-  end ();
-  int next = 0;
-  while (const BufferPtr frame = file.pull ())
-    EXPECT_EQ (GST_BUFFER_PTS (frame.get ()), GstClockTime (next++) * kPeriod);
-  EXPECT_EQ (next, kFrames);
-  EXPECT_EQ (counted (file.element (), "frames-unknown"), 0u);
-  EXPECT_EQ (counted (file.element (), "frames-missing"), 0u);
-}
-
-TEST_F (Restore, AfterASeekTheFramesBeforeItAreNotMissed)
-{
-  file.push_event (gst_event_new_flush_start ());
-  file.push_event (gst_event_new_flush_stop (TRUE));
-  file.push_event (segment_from (0, 0));
-  play (0, 0);
-  EXPECT_FALSE (file.posted<StreamIncomplete> ());
-}
-
-TEST_F (Restore, AFrameWhoseTimeTheFileRoundedUpStaysInTheSegment)
-{
-  g_object_set (file.element (), "tick", guint64 (1000), nullptr);
-  constexpr GstClockTime kRounded = kPeriod + 400;
-  GstSegment segment;
-  file.push_event (segment_from (kRounded, kRounded));
-  GST_BUFFER_PTS (recording.frames[1].get ()) = kRounded;
-  play (0, 0);
-  while (const EventPtr event = file.pull_event (GST_EVENT_SEGMENT))
-    gst_event_copy_segment (event.get (), &segment);
-  for (GstClockTime n = 0; n < restored.size (); n++) {
-    const GstClockTime time = GST_BUFFER_PTS (restored[n].get ());
-    EXPECT_EQ (time, (n + 1) * kPeriod);
-    EXPECT_EQ (gst_segment_to_running_time (&segment, GST_FORMAT_TIME, time),
-        n * kPeriod);
-    EXPECT_EQ (
-        gst_segment_to_stream_time (&segment, GST_FORMAT_TIME, time), time);
-  }
-}
-
-TEST_F (Restore, AfterASeekTheTimeOfTheStreamIsTheSame)
-{
-  g_object_set (file.element (), "tick", guint64 (1000), nullptr);
-  const auto time_of_second_frame = [this] (GstClockTime start) {
-    GstSegment segment;
-    file.push_event (segment_from (start, start - kPeriod / 2));
-    while (const EventPtr event = file.pull_event (GST_EVENT_SEGMENT))
-      gst_event_copy_segment (event.get (), &segment);
-    return gst_segment_to_stream_time (&segment, GST_FORMAT_TIME, 2 * kPeriod);
-  };
-  const guint64 whole = time_of_second_frame (kPeriod / 2);
-  EXPECT_EQ (whole, time_of_second_frame (kPeriod));
-  EXPECT_GE (whole, 2 * kPeriod - kPeriod / 2);
-}
-
 TEST_F (Restore, WithoutTheLastLineTheStreamWasCut)
 {
   play (-1, kFrames);
@@ -441,16 +216,6 @@ TEST_F (Restore, MarkupIsUnescaped)
   play ();
   EXPECT_FALSE (corrupted (0));
   EXPECT_EQ (schedule (), "staircase:2x2");
-}
-
-TEST_F (Restore, ExactTimesStayAsTheyAre)
-{
-  GstSegment segment;
-  file.push_event (segment_from (kPeriod, kPeriod / 2));
-  const EventPtr event = file.pull_event (GST_EVENT_SEGMENT);
-  const EventPtr last = file.pull_event (GST_EVENT_SEGMENT);
-  gst_event_copy_segment (last ? last.get () : event.get (), &segment);
-  EXPECT_EQ (segment.start, kPeriod);
 }
 
 /* From the last frame to the first, as in reverse playback. */

@@ -254,9 +254,11 @@ is_unfit (const Told &told)
 bool
 is_change_of_format (std::string_view kind, const Told &told)
 {
-  const bool of_output = (kind == "codedexposure-stack" || kind == "x264enc") &&
-                         g_error_matches (told.error.get (), GST_STREAM_ERROR,
-                             GST_STREAM_ERROR_FORMAT);
+  const bool of_output =
+      (kind == "codedexposure-stack" || kind == "codedexposure-recordmux" ||
+          kind == "x264enc") &&
+      g_error_matches (
+          told.error.get (), GST_STREAM_ERROR, GST_STREAM_ERROR_FORMAT);
   return of_output || (told.debug && std::strstr (told.debug.get (),
                                          "Caps changes are not"));
 }

@@ -84,14 +84,14 @@ Doctor::text ()
       .description =
           "Examines a bench, one check after the other: it shows masks on the "
           "DMD, looks at\nthem with the camera, and says what it saw, whether "
-          "that is good (PASS, WARN or\nFAIL), what is the most likely cause "
-          "of a fault, and what to try next. Writes a\npage with all figures, "
-          "FOLDER/index.html, and, unless a check failed, the bench\nprofile "
-          "FOLDER/bench.json, which the other commands can use. Takes less "
-          "than\nthree minutes at 25 frames/s. docs/doctor.md explains the "
-          "checks.\n\nPlace a plain, bright target before the bench; nothing "
-          "may move. Ctrl-C ends it\nand parks the mirrors. Without --camera, "
-          "it examines a simulated bench.\n",
+          "that is good (PASS, WARN,\nFAIL or UNKNOWN), what is the most "
+          "likely cause of a fault, and what to try\nnext. Writes a page with "
+          "all figures, FOLDER/index.html, and, unless a check\nfailed, the "
+          "bench profile FOLDER/bench.json, which the other commands can "
+          "use.\nTakes less than three minutes at 25 frames/s. docs/doctor.md "
+          "explains the\nchecks.\n\nPlace a plain, bright target before the "
+          "bench; nothing may move. Ctrl-C ends it\nand parks the mirrors. "
+          "Without --camera, it examines a simulated bench.\n",
       .notes =
           "Exit status: 0 all is good, or worth a warning; 1 a check failed, "
           "or could not\nbe made; 2 wrong usage; 4 none failed, but of one or "

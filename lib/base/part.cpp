@@ -87,9 +87,11 @@ Part::busy () const
 Error
 Part::unwritable () const
 {
-  return {"cannot write " + name_ + ": " + reason (errno) +
-              "; choose a folder that you can write to",
-      ErrorCode::io};
+  const char *remedy = errno == ENAMETOOLONG
+                           ? "; choose a shorter name"
+                           : "; choose a folder that you can write to";
+  return {
+      "cannot write " + name_ + ": " + reason (errno) + remedy, ErrorCode::io};
 }
 
 Result<void>

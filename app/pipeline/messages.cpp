@@ -139,8 +139,8 @@ added (const gchar *debug)
   return end_of_place ? end_of_place + 1 : nullptr;
 }
 
-/* An element names its property, but a script has an option for it, and a
- * command for another element. */
+/* Elements name properties, pads and other elements, for which the program has
+ * options and commands. */
 std::string
 with_options (const char *text)
 {
@@ -254,13 +254,10 @@ is_unfit (const Told &told)
 bool
 is_change_of_format (std::string_view kind, const Told &told)
 {
-  const bool of_output =
-      (kind == "codedexposure-stack" || kind == "codedexposure-recordmux" ||
-          kind == "x264enc") &&
-      g_error_matches (
-          told.error.get (), GST_STREAM_ERROR, GST_STREAM_ERROR_FORMAT);
-  return of_output || (told.debug && std::strstr (told.debug.get (),
-                                         "Caps changes are not"));
+  return (kind == "codedexposure-stack" || kind == "codedexposure-recordmux" ||
+             kind == "x264enc") &&
+         g_error_matches (
+             told.error.get (), GST_STREAM_ERROR, GST_STREAM_ERROR_FORMAT);
 }
 
 } // namespace

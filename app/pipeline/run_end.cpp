@@ -29,7 +29,8 @@ Run::say_no_frame ()
 {
   if (damaged_ && has_tracks (job_.source))
     status_.line ("error: no coded frame of " + job_.source +
-                  " can be decoded: they are damaged or missing");
+                  " can be decoded: they are damaged or missing; use "
+                  "another copy of the recording");
   else if (damaged_)
     status_.line ("error: the head of the stream is damaged, so its tracks "
                   "cannot be found; if ffmpeg reads it, \"ffmpeg -i IN.mkv "

@@ -89,7 +89,7 @@ private:
   };
   std::deque<Waiting> partners_;
   SegmentsBeside segments_;
-  /** Segments from that of the frames on which are left, by their seqnum. */
+  /** Segments that the demuxer has left, but the frames have not, by seqnum. */
   std::map<guint32, SegmentLeft> left_;
   CapsPtr caps_;
   bool may_wait_ = true;     ///< let_wait ()

@@ -50,7 +50,6 @@
  * Since: 0.2
  */
 #include <algorithm>
-#include <array>
 #include <string>
 #include <utility>
 #include <vector>
@@ -288,17 +287,25 @@ follow_tags (GstElement *self, GstEvent *event)
     add_partner (self);
 }
 
-bool
-is_other_video (const GstCaps *before, const GstCaps *after)
+/* "The width of the frames changes from 64 to 32"; empty: nothing changes that
+ * a recording has once. */
+std::string
+change_of_video (const GstCaps *before, const GstCaps *after)
 {
-  const GstStructure *old = gst_caps_get_structure (before, 0);
-  const GstStructure *own = gst_caps_get_structure (after, 0);
-  constexpr std::array kFixed = {"format", "width", "height", "framerate"};
-  return std::ranges::any_of (kFixed, [&] (const char *name) {
-    const GValue *was = gst_structure_get_value (old, name);
-    const GValue *is = gst_structure_get_value (own, name);
-    return was && is && gst_value_compare (was, is) != GST_VALUE_EQUAL;
-  });
+  const auto text_in = [] (const GstCaps *caps, const char *field) {
+    const GValue *value =
+        gst_structure_get_value (gst_caps_get_structure (caps, 0), field);
+    const CharPtr text (value ? gst_value_serialize (value) : nullptr);
+    return std::string (text ? text.get () : "");
+  };
+  for (const char *field : {"format", "width", "height", "framerate"}) {
+    const std::string was = text_in (before, field);
+    const std::string is = text_in (after, field);
+    if (!was.empty () && !is.empty () && was != is)
+      return std::string ("The ") + field + " of the frames changes from " +
+             was + " to " + is;
+  }
+  return "";
 }
 
 /* What FFV1 cannot keep is kept raw. */
@@ -309,11 +316,13 @@ follow_caps (GstElement *self, GstEvent *event)
   Branch &branch = state.coded;
   const CapsPtr before (
       gst_pad_get_current_caps (pad_of (branch.log, "sink").get ()));
-  if (state.has_begun && before &&
-      is_other_video (before.get (), caps_of (event)))
+  const std::string change =
+      state.has_begun && before
+          ? change_of_video (before.get (), caps_of (event))
+          : "";
+  if (!change.empty ())
     POST_ERROR (self, STREAM, FORMAT,
-        "The format, the size or the rate of the frames changes, but a "
-        "recording has one for all. Begin another recording.");
+        change + ", but a recording has one for all. Begin another recording.");
   if (is_encoded (caps_of (event)) &&
       settings_of (as<Self> (self)).codec != Codec::copy)
     POST_ERROR (self, STREAM, FORMAT,

@@ -128,7 +128,8 @@ TEST (RecordedFrames, OfAnotherRateAreAnErrorThatSaysSo)
                 " ! concat name=all ! codedexposure-recordmux ! fakesink " +
                 frames + gray_caps (64, 48, "50/1") + " ! all.")
           .play ()
-          .find ("Begin another recording"),
+          .find ("The framerate of the frames changes from 25/1 to 50/1, but a "
+                 "recording has one for all. Begin another recording"),
       std::string::npos);
 }
 

@@ -22,9 +22,24 @@ segment_from (GstClockTime start, GstClockTime stream_time)
   return gst_event_new_segment (&segment);
 }
 
+class RestoreSeek : public Restore
+{
+protected:
+  /** The frames from @p next on come out once, and nothing is said of them. */
+  void expect_each_from (int next)
+  {
+    while (const BufferPtr frame = file.pull ())
+      EXPECT_EQ (
+          GST_BUFFER_PTS (frame.get ()), GstClockTime (next++) * kPeriod);
+    EXPECT_EQ (next, kFrames);
+    EXPECT_EQ (counted (file.element (), "frames-unknown"), 0u);
+    EXPECT_EQ (counted (file.element (), "frames-missing"), 0u);
+  }
+};
+
 /* A demuxer was stopped between a frame and its line, and has read on before
  * the frames get there. If it is sent to that frame, it goes on behind it. */
-TEST_F (Restore, ASeekWithoutAFlushLeavesTheFrameWhoseLineHasNotCome)
+TEST_F (RestoreSeek, ASeekWithoutAFlushLeavesTheFrameWhoseLineHasNotCome)
 {
   Recording again;
   push_line (0);
@@ -41,16 +56,11 @@ TEST_F (Restore, ASeekWithoutAFlushLeavesTheFrameWhoseLineHasNotCome)
   file.push_event (segment_from (5 * kPeriod, 0));
   push_line (5);
   end ();
-  int next = 1;
-  while (const BufferPtr frame = file.pull ())
-    EXPECT_EQ (GST_BUFFER_PTS (frame.get ()), GstClockTime (next++) * kPeriod);
-  EXPECT_EQ (next, kFrames);
-  EXPECT_EQ (counted (file.element (), "frames-unknown"), 0u);
-  EXPECT_EQ (counted (file.element (), "frames-missing"), 0u);
+  expect_each_from (1);
 }
 
 /* The demuxer was sent to a frame, and had read it before it stopped. */
-TEST_F (Restore, AFrameThatASeekWithoutAFlushGoesBackToIsThereOnce)
+TEST_F (RestoreSeek, AFrameThatASeekWithoutAFlushGoesBackToIsThereOnce)
 {
   Recording again;
   push_line (0);
@@ -63,16 +73,11 @@ TEST_F (Restore, AFrameThatASeekWithoutAFlushGoesBackToIsThereOnce)
     push_line (i);
   }
   end ();
-  int next = 0;
-  while (const BufferPtr frame = file.pull ())
-    EXPECT_EQ (GST_BUFFER_PTS (frame.get ()), GstClockTime (next++) * kPeriod);
-  EXPECT_EQ (next, kFrames);
-  EXPECT_EQ (counted (file.element (), "frames-unknown"), 0u);
-  EXPECT_EQ (counted (file.element (), "frames-missing"), 0u);
+  expect_each_from (0);
 }
 
 /* It read a further one before it stopped, and goes on behind it. */
-TEST_F (Restore, AFrameThatASeekWithoutAFlushGoesOnBehindIsThere)
+TEST_F (RestoreSeek, AFrameThatASeekWithoutAFlushGoesOnBehindIsThere)
 {
   push_line (0);
   push_frame (0);
@@ -85,12 +90,7 @@ TEST_F (Restore, AFrameThatASeekWithoutAFlushGoesOnBehindIsThere)
       push_frame (i + 1);
   }
   end ();
-  int next = 0;
-  while (const BufferPtr frame = file.pull ())
-    EXPECT_EQ (GST_BUFFER_PTS (frame.get ()), GstClockTime (next++) * kPeriod);
-  EXPECT_EQ (next, kFrames);
-  EXPECT_EQ (counted (file.element (), "frames-unknown"), 0u);
-  EXPECT_EQ (counted (file.element (), "frames-missing"), 0u);
+  expect_each_from (0);
 }
 
 TEST_F (Restore, AfterASeekTheFramesBeforeItAreNotMissed)

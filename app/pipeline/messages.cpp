@@ -8,8 +8,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <regex>
-#include <utility>
 
 #include "common/messages.h"
 #include "pipeline/cameras.h"
@@ -139,24 +137,6 @@ added (const gchar *debug)
   return end_of_place ? end_of_place + 1 : nullptr;
 }
 
-/* Elements name properties, pads and other elements, for which the program has
- * options and commands. */
-std::string
-with_options (const char *text)
-{
-  static const std::pair<std::regex, const char *> kWords[] = {
-      {std::regex ("[Tt]he (schedule|mapping|bench) property"), "--$1"},
-      {std::regex ("with moirecalib"), "with \"codedexposure calibrate\""},
-      {std::regex ("Link them to (the )?pad o.*"),
-          "Use \"codedexposure decode FIRST.mkv --fuse QUALITY --second "
-          "SECOND.mkv\", whose SECOND.mkv has the beam of the mirrors that are "
-          "off"}};
-  std::string words = text;
-  for (const auto &[of_element, of_command] : kWords)
-    words = std::regex_replace (words, of_element, of_command);
-  return words;
-}
-
 bool
 is_video_sink (GstElement *element, GstElementFactory *factory)
 {
@@ -283,7 +263,7 @@ told (GstMessage *message)
   const std::string name = file ? file : GST_OBJECT_NAME (source);
   if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_INFO && detail)
     return name + ": " + detail;
-  return name + ": " + with_options (parts.error->message) +
+  return name + ": " + parts.error->message +
          (detail ? std::string ("\n    ") + detail : "");
 }
 

@@ -112,9 +112,8 @@ bool
 CodedFilter::find_schedule (CodedFormat &format)
 {
   if (const auto &asked = stream_.settings.schedule.read) {
-    if (!*asked)
-      return post_error (
-          "The schedule property cannot be read: " + asked->error ().message);
+    if (!check_named (element_, "schedule", stream_.settings.schedule))
+      return false;
     format.schedule = asked->value ();
     report_overruled (format.schedule);
     return true;
@@ -129,12 +128,12 @@ CodedFilter::find_schedule (CodedFormat &format)
   if (stream_.settings.require_schedule)
     return post_error (
         "The stream has no schedule, neither in its tags nor in its "
-        "track. Set the schedule property.");
+        "track. Set the schedule property (or --schedule).");
   format.assumed = true;
   if (!std::exchange (stream_.warned_assumed, true))
     POST_WARNING (element_, STREAM, FORMAT,
         "The stream has no schedule tag; assuming " + format.schedule.text () +
-            ". Set the schedule property if it is another.");
+            ". Set the schedule property (or --schedule) if it is another.");
   return true;
 }
 
@@ -150,10 +149,11 @@ CodedFilter::check_camera (const CodedFormat &format) const
     return post_error (
         "These are frames of the beam of the mirrors that are off, partners of "
         "those of another camera. Link them to the pad off of "
-        "codedexposure-pair, and the others to its pad on.");
+        "codedexposure-pair, and the others to its pad on, or " +
+        std::string (kDecodeTwo));
   const std::string remedy =
       " Decode the frames as the camera gave them, or set the schedule "
-      "property.";
+      "property (or --schedule).";
   if (camera.size && *camera.size != format.size)
     return post_error ("The coded frames have " + size_text (format.size) +
                        " pixels, but the camera gave " +
@@ -181,7 +181,7 @@ CodedFilter::report_overruled (const Schedule &asked)
     return;
   stream_.overruled = said;
   POST_WARNING (element_, STREAM, FORMAT,
-      "The schedule property, " + asked.text () +
+      "The schedule property (or --schedule), " + asked.text () +
           ", overrides the schedule of the stream, " + said.text () + ".");
 }
 
@@ -210,9 +210,8 @@ CodedFilter::find_bench (CodedFormat &format)
     return good.ok ();
   };
   if (const auto &asked = stream_.settings.bench.read) {
-    if (!*asked)
-      return post_error (
-          "The bench property cannot be read: " + asked->error ().message);
+    if (!check_named (element_, "bench", stream_.settings.bench))
+      return false;
     const BenchProfile given = asked->value ().of_beam (tagged ().off_beam);
     if (stream_.bench && !fits (given.check_bench (*stream_.bench)))
       return false;
@@ -246,16 +245,17 @@ bool
 CodedFilter::find_mapping (Extent camera, std::optional<Mapping> &mapping)
 {
   if (const auto &asked = stream_.settings.mapping.read) {
-    if (!*asked)
-      return post_error (
-          "The mapping property cannot be read: " + asked->error ().message);
+    if (!check_named (element_, "mapping", stream_.settings.mapping))
+      return false;
     mapping = asked->value ();
     if (mapping->camera () == camera)
       return true;
-    return post_error ("The mapping " + stream_.settings.mapping.text +
-                       " is for frames of " + size_text (mapping->camera ()) +
-                       " pixels, but these have " + size_text (camera) +
-                       ". Measure a new mapping with moirecalib.");
+    return post_error (
+        "The mapping " + stream_.settings.mapping.text + " is for frames of " +
+        size_text (mapping->camera ()) + " pixels, but these have " +
+        size_text (camera) +
+        ". Measure a new mapping with moirecalib or \"codedexposure "
+        "calibrate\".");
   }
   if (stream_.settings.bench.read)
     mapping = stream_.bench->mapping;

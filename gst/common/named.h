@@ -41,16 +41,17 @@ private:
   }
 };
 
-/** Posts an error of the property @p name of @p element, and returns false, if
- * what it names cannot be read. */
+/** Posts an error of the property @p name of @p element, which is also an
+ * option of the program codedexposure, and returns false, if what it names
+ * cannot be read. */
 template <typename T>
 bool
 check_named (gpointer element, const char *name, const Named<T> &named)
 {
   return !named.read || *named.read ||
-         refuse_settings (element,
-             std::string ("The ") + name +
-                 " property cannot be read: " + named.read->error ().message);
+         refuse_settings (
+             element, std::string ("The ") + name + " property (or --" + name +
+                          ") cannot be read: " + named.read->error ().message);
 }
 
 /** Reads the file of a setting of @p element again, because it may have

@@ -65,6 +65,11 @@ void follow_tagged_bits (GstEvent *event, int &bits);
 /** If the tags of @p event say that its frames were decoded before: a message
  * of an element that takes coded frames only. */
 std::optional<std::string> why_not_coded (GstEvent *event);
+/** What else to do with recordings of the two beams, after "or". */
+constexpr const char kDecodeTwo[] =
+    "use \"codedexposure decode FIRST.mkv --fuse QUALITY --second "
+    "SECOND.mkv\", whose SECOND.mkv has the beam of the mirrors that are off.";
+
 /** Posts it as an error of @p element. */
 void refuse_decoded (gpointer element, GstEvent *event);
 

@@ -30,7 +30,7 @@ refuse_beam (GstCodedExposurePair *self, bool on)
   return refuse (self,
       std::string ("The frames of pad ") + (on ? "on" : "off") +
           " are of the beam of the mirrors that are " + (on ? "off" : "on") +
-          ". Link them to pad " + (on ? "off" : "on") + ".");
+          ". Link them to pad " + (on ? "off" : "on") + ", or " + kDecodeTwo);
 }
 
 bool

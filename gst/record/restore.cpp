@@ -51,7 +51,7 @@ warn_if_different (Self *self, const StreamSetup &said)
           ", but its frames were recorded with " +
           state.setup->schedule.text () +
           ", as their track says, which is used. To use another, set the "
-          "schedule property where they are decoded.");
+          "schedule property (or --schedule) where they are decoded.");
 }
 
 void

@@ -180,7 +180,8 @@ TEST_F (DemuxMapping, OfOtherFramesIsRefused)
   EXPECT_EQ (
       demux.error (), "The mapping " + path.string () +
                           " is for frames of 64x48 pixels, but these have "
-                          "64x50. Measure a new mapping with moirecalib.");
+                          "64x50. Measure a new mapping with moirecalib or "
+                          "\"codedexposure calibrate\".");
 }
 
 TEST_F (DemuxMapping, OfOtherFramesInTheTagIsLeftOut)
@@ -203,8 +204,9 @@ TEST_F (DemuxMapping, ThatCannotBeReadIsAnError)
     demux.set_caps (gray_caps (kWidth, kHeight));
     g_object_set (demux.element (), "mapping", save (text).c_str (), nullptr);
     EXPECT_EQ (demux.push (frame (0, 0)), GST_FLOW_NOT_NEGOTIATED);
-    EXPECT_EQ (
-        demux.error ().find ("The mapping property cannot be read: "), 0u);
+    EXPECT_EQ (demux.error ().find (
+                   "The mapping property (or --mapping) cannot be read: "),
+        0u);
   }
 }
 

@@ -35,9 +35,9 @@ TEST_F (DemuxSchedule, PropertyWinsOverTheTag)
   ASSERT_EQ (push (0), GST_FLOW_OK);
   EXPECT_EQ (in_force (*demux), "sequential:2x2");
   EXPECT_EQ (pull_images (*demux).size (), 4u);
-  EXPECT_EQ (demux->warning (),
-      "The schedule property, sequential:2x2, overrides the schedule of the "
-      "stream, sequential:3x3.");
+  EXPECT_EQ (demux->warning (), "The schedule property (or --schedule), "
+                                "sequential:2x2, overrides the schedule of the "
+                                "stream, sequential:3x3.");
   demux->set_caps (gray_caps (24, 24, "50/1"));
   ASSERT_EQ (push (1), GST_FLOW_OK);
   EXPECT_EQ (demux->warning (), "") << "once";

@@ -179,8 +179,7 @@ TEST_F (FuseMapping, UncertaintyHasTheErrorsOfRectification)
     Image<float> errors (kWidth, kHeight);
     ASSERT_TRUE (
         rectifier.run (seen.view (), mirrors.view (), 0, errors.view ()));
-    ASSERT_TRUE (
-        fuser.take (mirrors.view (), {}, {.coded = errors.view ()}));
+    ASSERT_TRUE (fuser.take (mirrors.view (), {}, {.coded = errors.view ()}));
     ASSERT_TRUE (fuser.fuse (views_of (fused), {}, views_of (deviations)));
     for (const auto &expected : deviations) {
       const BufferPtr buffer (gst_harness_try_pull (pad));
@@ -260,7 +259,8 @@ TEST_F (FuseMapping, OfOtherFramesIsRefused)
   EXPECT_EQ (
       fuse->error (), "The mapping " + path.string () +
                           " is for frames of 96x72 pixels, but these have "
-                          "24x20. Measure a new mapping with moirecalib.");
+                          "24x20. Measure a new mapping with moirecalib or "
+                          "\"codedexposure calibrate\".");
 }
 
 TEST_F (FuseMapping, OfOtherFramesInTheTagIsLeftOut)
@@ -280,5 +280,7 @@ TEST_F (FuseMapping, ThatCannotBeReadIsAnError)
   g_object_set (
       fuse->element (), "mapping", save ("nonsense").c_str (), nullptr);
   EXPECT_EQ (push_grey ({kWidth, kHeight}, 0), GST_FLOW_NOT_NEGOTIATED);
-  EXPECT_EQ (fuse->error ().find ("The mapping property cannot be read: "), 0u);
+  EXPECT_EQ (fuse->error ().find (
+                 "The mapping property (or --mapping) cannot be read: "),
+      0u);
 }

@@ -500,7 +500,10 @@ TEST (PairBench, TheFramesOfTheOtherBeamAreNotDecoded)
   EXPECT_EQ (pipeline.play (),
       "These are frames of the beam of the mirrors that are off, partners of "
       "those of another camera. Link them to the pad off of "
-      "codedexposure-pair, and the others to its pad on.");
+      "codedexposure-pair, and the others to its pad on, or use "
+      "\"codedexposure decode FIRST.mkv --fuse QUALITY --second "
+      "SECOND.mkv\", whose SECOND.mkv has the beam of the mirrors that are "
+      "off.");
 }
 
 } // namespace

@@ -69,7 +69,9 @@ TEST_F (Pair, SwappedCamerasAreAnErrorThatSaysSo)
   EXPECT_EQ (run (frames ({0, 1}), frames ({0, 1})), Numbers{});
   EXPECT_EQ (pair.error (),
       "The frames of pad on are of the beam of the mirrors that are off. Link "
-      "them to pad off.");
+      "them to pad off, or use \"codedexposure decode FIRST.mkv --fuse "
+      "QUALITY --second SECOND.mkv\", whose SECOND.mkv has the beam of the "
+      "mirrors that are off.");
 }
 
 TEST_F (Pair, AFirstCameraAtPadOffIsAnErrorToo)
@@ -78,7 +80,9 @@ TEST_F (Pair, AFirstCameraAtPadOffIsAnErrorToo)
   EXPECT_EQ (run (frames ({0, 1}), frames ({0, 1})), Numbers{});
   EXPECT_EQ (pair.error (),
       "The frames of pad off are of the beam of the mirrors that are on. Link "
-      "them to pad on.");
+      "them to pad on, or use \"codedexposure decode FIRST.mkv --fuse "
+      "QUALITY --second SECOND.mkv\", whose SECOND.mkv has the beam of the "
+      "mirrors that are off.");
 }
 
 TEST_F (Pair, CapsAndAllocationAreThoseOfTheFirstCamera)

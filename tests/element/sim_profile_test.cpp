@@ -118,9 +118,11 @@ TEST (SimProfile, RefusesAProfileThatCannotBeRead)
   const ObjectPtr<GstElement> sim (GST_ELEMENT (gst_object_ref_sink (
       gst_element_factory_make ("codedexposure-sim", nullptr))));
   g_object_set (sim.get (), "bench", "no.json", nullptr);
-  EXPECT_NE (refusal (sim.get (), GST_STATE_PAUSED)
-                 .find ("The bench property cannot be read: bench profile "
-                        "'no.json'"),
+  EXPECT_NE (
+      refusal (sim.get (), GST_STATE_PAUSED)
+          .find (
+              "The bench property (or --bench) cannot be read: bench profile "
+              "'no.json'"),
       std::string::npos);
   gst_element_set_state (sim.get (), GST_STATE_NULL);
 }

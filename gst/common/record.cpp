@@ -43,8 +43,10 @@ carried_hash (GstBuffer *frame)
 std::optional<Nanoseconds>
 known_time (GstClockTime time)
 {
-  return GST_CLOCK_TIME_IS_VALID (time) ? std::optional (Nanoseconds (time))
-                                        : std::nullopt;
+  return GST_CLOCK_TIME_IS_VALID (time)
+             ? std::optional (
+                   Nanoseconds (std::min<GstClockTime> (time, G_MAXINT64)))
+             : std::nullopt;
 }
 
 /** What comes from the meta. */

@@ -206,6 +206,20 @@ begins_before (const GstSegment &segment, GstBuffer *frame)
          GST_BUFFER_PTS (frame) < segment.start;
 }
 
+bool
+has_times_of_recording (GstCodedExposureLog *self, const FrameRecord &record)
+{
+  const auto time = record.too_far ();
+  if (time)
+    POST_ERROR (self, STREAM, FORMAT,
+        "A coded frame has a time of " + std::to_string (*time) +
+            " ns, but a recording has none that is farther from 0 than 73 "
+            "years (" +
+            std::to_string (kFarthestTime) +
+            " ns). Let the source begin its times near 0.");
+  return !time;
+}
+
 GstFlowReturn
 transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
 {
@@ -220,6 +234,8 @@ transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
   const int pilot = state.setup ? state.setup->schedule.pilot_rows () : 0;
   FrameRecord record =
       record_of (frame, state.info, base->segment, pilot, state.frames++);
+  if (!has_times_of_recording (self, record))
+    return GST_FLOW_ERROR;
   count_lost (self, record);
   if (state.file.is_open () && !state.file.write (record.to_json ()))
     return GST_FLOW_ERROR;

@@ -64,11 +64,17 @@ read_known (const Json &object, const char *key, std::optional<T> &to)
   }
 }
 
+bool
+is_too_far (const std::optional<Nanoseconds> &time)
+{
+  return time && (*time < -kFarthestTime || *time > kFarthestTime);
+}
+
 void
 read_time (const Json &object, const char *key, std::optional<Nanoseconds> &to)
 {
   read_known (object, key, to);
-  if (to && (*to < -kFarthestTime || *to > kFarthestTime))
+  if (is_too_far (to))
     throw expected (key, "a time within 73 years", object[key]);
 }
 
@@ -168,6 +174,16 @@ read_record (const Json &object)
     record.hash = read_hex (value, "hash", kHashDigits);
   });
   return record;
+}
+
+std::optional<Nanoseconds>
+FrameRecord::too_far () const
+{
+  for (const auto &time :
+      {pts, duration, exposure_start, exposure_duration, time_uncertainty})
+    if (is_too_far (time))
+      return time;
+  return std::nullopt;
 }
 
 std::string

@@ -36,6 +36,8 @@ struct FrameRecord {
   std::vector<std::string> flags;    ///< "discont", "corrupted", "gap" ...
   std::optional<std::uint64_t> hash; ///< pixel_hash ()
 
+  /** The first of its times that no recording has; nothing: all are good. */
+  std::optional<Nanoseconds> too_far () const;
   /** One line; unknown values are left out, but `locked` is null. */
   std::string to_json () const;
 

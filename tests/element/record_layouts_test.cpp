@@ -133,6 +133,19 @@ TEST (RecordedFrames, OfAnotherRateAreAnErrorThatSaysSo)
       std::string::npos);
 }
 
+TEST (RecordedFrames, FartherThanTheTimesOfARecordingAreAnErrorThatSaysSo)
+{
+  for (const gint64 offset : {gint64 (1) << 62, G_MAXINT64}) {
+    Pipeline pipeline ("videotestsrc num-buffers=3 ! " + gray_caps (64, 48) +
+                       " ! identity name=later ! codedexposure-recordmux "
+                       "! fakesink");
+    gst_pad_set_offset (pipeline.pad ("later", "src").get (), offset);
+    EXPECT_NE (pipeline.play ().find (
+                   std::to_string (offset) + " ns, but a recording has none"),
+        std::string::npos);
+  }
+}
+
 /* From 15 ms to 45 ms, at the @rate, a double. */
 GstPadProbeReturn
 cut_segment (GstPad *, GstPadProbeInfo *info, gpointer rate) noexcept

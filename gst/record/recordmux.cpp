@@ -308,18 +308,32 @@ change_of_video (const GstCaps *before, const GstCaps *after)
   return "";
 }
 
-/* What FFV1 cannot keep is kept raw. */
-void
+/* Of coded frames, which are grey, it says nothing. */
+CapsPtr
+without_colorimetry (const GstCaps *caps)
+{
+  CapsPtr copy (gst_caps_copy (caps));
+  gst_structure_remove_fields (gst_caps_get_structure (copy.get (), 0),
+      "colorimetry", "chroma-site", nullptr);
+  return copy;
+}
+
+/* What FFV1 cannot keep is kept raw. Caps that tell the muxer, which takes no
+ * others, nothing new are dropped. */
+GstPadProbeReturn
 follow_caps (GstElement *self, GstEvent *event)
 {
   auto &state = state_in<Self> (self);
   Branch &branch = state.coded;
   const CapsPtr before (
       gst_pad_get_current_caps (pad_of (branch.log, "sink").get ()));
+  const bool can_change = state.has_begun && before;
+  if (can_change &&
+      gst_caps_is_equal (without_colorimetry (before.get ()).get (),
+          without_colorimetry (caps_of (event)).get ()))
+    return GST_PAD_PROBE_DROP;
   const std::string change =
-      state.has_begun && before
-          ? change_of_video (before.get (), caps_of (event))
-          : "";
+      can_change ? change_of_video (before.get (), caps_of (event)) : "";
   if (!change.empty ())
     POST_ERROR (self, STREAM, FORMAT,
         change + ", but a recording has one for all. Begin another recording.");
@@ -328,10 +342,11 @@ follow_caps (GstElement *self, GstEvent *event)
     POST_ERROR (self, STREAM, FORMAT,
         "The frames are encoded already. Set codec=copy to record them as they "
         "come, or decode them before this element.");
-  if (state.has_begun || !branch.encoder || ffv1_keeps (caps_of (event)))
-    return;
-  remove_part (self, branch.encoder);
-  link_frames (branch, branch.video);
+  if (!state.has_begun && branch.encoder && !ffv1_keeps (caps_of (event))) {
+    remove_part (self, branch.encoder);
+    link_frames (branch, branch.video);
+  }
+  return GST_PAD_PROBE_OK;
 }
 
 /* All are taken, so that follow_caps () says what is wrong. */
@@ -364,7 +379,7 @@ on_input (GstPad *, GstPadProbeInfo *info, gpointer data) noexcept
     if (std::exchange (state.was_flushed, false))
       begin_anew (self);
   if (event && GST_EVENT_TYPE (event) == GST_EVENT_CAPS)
-    follow_caps (self, event);
+    return follow_caps (self, event);
   if (event && GST_EVENT_TYPE (event) == GST_EVENT_TAG)
     follow_tags (self, event);
   if (is_frame)

@@ -133,6 +133,20 @@ TEST (RecordedFrames, OfAnotherRateAreAnErrorThatSaysSo)
       std::string::npos);
 }
 
+TEST (RecordedFrames, OfAnotherColorimetryAreRecorded)
+{
+  const std::string frames = "videotestsrc num-buffers=3 ! ";
+  const std::string caps = gray_caps (64, 48) + ",colorimetry=";
+  Pipeline pipeline (frames + caps +
+                     "1:4:0:0 ! concat name=all ! codedexposure-recordmux "
+                     "! codedexposure-recorddemux name=demux ! fakesink " +
+                     frames + caps + "bt709 ! all.");
+  EXPECT_EQ (pipeline.play (), "");
+  const ObjectPtr<GstElement> demux = pipeline["demux"];
+  EXPECT_EQ (counter_of (demux.get (), "frames"), 6u);
+  EXPECT_EQ (counter_of (demux.get (), "frames-unknown"), 0u);
+}
+
 TEST (RecordedFrames, FartherThanTheTimesOfARecordingAreAnErrorThatSaysSo)
 {
   for (const gint64 offset : {gint64 (1) << 62, G_MAXINT64}) {

@@ -214,7 +214,7 @@ keep_what_is_due (GstCodedExposureKeep *self, GstClockTime pts)
   const GstClockTime oldest =
       GST_BUFFER_PTS (state.frames.buffers.front ().get ());
   if (since (event) < gint64 (state.in_force.after) &&
-      (since (oldest) > since (event) || pts == event))
+      since (oldest) > since (event))
     return;
   state.followed = std::exchange (state.next, std::nullopt);
   begin_task (self);

@@ -381,6 +381,16 @@ TEST_F (Keep, AnEventIsKeptBeforeMemoryForgetsIt)
   EXPECT_EQ (frames.numbers, (std::vector<guint64>{41, 42, 43, 44, 45}));
 }
 
+TEST_F (Keep, WithMemoryForOneFrameAnEventIsThatFrame)
+{
+  begin ("event=mean:20 max-bytes=1");
+  push_all (0, 40, 50);
+  push_all (41, 80, 150);
+  end ();
+  EXPECT_EQ (keep_->posted<Kept> ().value ().frame, 41u);
+  EXPECT_EQ (read ("event-frame000041.mkv").values, std::vector<int>{150});
+}
+
 /* 200 of 4095 are 5 %, and of 65535 less than 1. */
 TEST_F (Keep, TheTagsSayTheBitsOfFramesWithoutMetadata)
 {

@@ -245,7 +245,9 @@ watch (GstCodedExposureKeep *self, GstBuffer *frame)
   const auto meta = get_frame_meta (frame);
   if (is_corrupted (frame) || shows_pattern (frame))
     return state.events->skip ();
-  if (meta && state.last && meta->frame != *state.last + 1)
+  const bool goes_back = GST_BASE_TRANSFORM (self)->segment.rate < 0;
+  if (meta && state.last &&
+      meta->frame != (goes_back ? *state.last - 1 : *state.last + 1))
     state.events->skip ();
   state.last = meta ? std::optional (meta->frame) : std::nullopt;
   MappedFrame mapped (*state.info, frame, GST_MAP_READ);

@@ -323,6 +323,17 @@ TEST_F (Keep, FollowsAnEventBackwardsForItsTime)
   EXPECT_EQ (kept->frames, 51u);
 }
 
+TEST_F (Keep, FindsMotionBackwards)
+{
+  begin ("event=motion:20 after=400000000");
+  push_segment (-1);
+  push_all_back (80, 41, 50);
+  push_all_back (40, 0, 150);
+  end ();
+  EXPECT_EQ (keep_->posted<EventFound> ().value ().frame, 40u);
+  EXPECT_EQ (keep_->posted<Kept> ().value ().frame, 30u);
+}
+
 TEST_F (Keep, ASegmentThatGoesBackOrTheOtherWayBeginsAnew)
 {
   begin ();

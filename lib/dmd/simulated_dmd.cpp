@@ -31,6 +31,14 @@ SimulatedMirrors::find (const std::string &name)
 }
 
 void
+SimulatedMirrors::release ()
+{
+  stop ();
+  const std::lock_guard guard (lock_);
+  is_claimed_ = false;
+}
+
+void
 SimulatedMirrors::program (const Schedule &schedule)
 {
   stop ();
@@ -172,15 +180,15 @@ struct Options {
 class SimulatedDmd : public Dmd
 {
 public:
-  explicit SimulatedDmd (Options options)
-      : options_ (std::move (options)),
-        mirrors_ (SimulatedMirrors::find (options_.mirrors))
+  /** @p mirrors  that it has claimed. */
+  SimulatedDmd (Options options, std::shared_ptr<SimulatedMirrors> mirrors)
+      : options_ (std::move (options)), mirrors_ (std::move (mirrors))
   {
     mirrors_->set_shape (options_.shape);
     for (const Slip &slip : options_.slips)
       mirrors_->slip_at (slip.slot, slip.by);
   }
-  ~SimulatedDmd () override { mirrors_->stop (); }
+  ~SimulatedDmd () override { mirrors_->release (); }
 
   const DmdInfo &info () const override { return options_.info; }
 
@@ -315,8 +323,15 @@ open_simulated_dmd (std::string_view device)
     return Error{
         options.info.name + ": open failed, as its 'fail' option asks for",
         ErrorCode::device};
-  return std::unique_ptr<Dmd> (
-      std::make_unique<SimulatedDmd> (std::move (options)));
+  auto mirrors = SimulatedMirrors::find (options.mirrors);
+  if (!mirrors->claim ())
+    return Error{options.info.name +
+                     " is in use: another driver of this process, such as a "
+                     "second dmdsync, controls it. Close that one first, or "
+                     "choose another name",
+        ErrorCode::busy};
+  return std::unique_ptr<Dmd> (std::make_unique<SimulatedDmd> (
+      std::move (options), std::move (mirrors)));
 }
 
 } // namespace codedexposure

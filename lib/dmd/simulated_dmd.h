@@ -10,6 +10,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "dmd/dmd.h"
 
@@ -30,6 +31,15 @@ public:
   /** The mirrors of that name in this process, which exist as long as somebody
    * holds them. */
   static std::shared_ptr<SimulatedMirrors> find (const std::string &name);
+
+  /** For a driver, which alone programs them until it releases them; false:
+   * another one has them. */
+  bool claim ()
+  {
+    const std::lock_guard guard (lock_);
+    return !std::exchange (is_claimed_, true);
+  }
+  void release ();
 
   /** Parks the mirrors and takes the masks of @p schedule. */
   void program (const Schedule &schedule);
@@ -129,6 +139,7 @@ private:
   std::optional<int> decide (std::int64_t slot);
 
   mutable std::mutex lock_; // covers everything below; a leaf lock
+  bool is_claimed_ = false;
   std::optional<Schedule> schedule_;
   int slots_ = 0; // of an exposure; 0: there are no masks
   Shape shape_;
@@ -144,7 +155,9 @@ private:
 
 /**
  * Opens "sim:NAME[,key=value...]", whose mirrors are SimulatedMirrors::find
- * (NAME). The keys say what the device can do and how it fails:
+ * (NAME), unless another driver has them.
+ *
+ * The keys say what the device can do and how it fails:
  *   size=WxH            mirrors, default 1024x768; a bench with more pixels
  *                       refuses a size that is given
  *   layout=address|lattice|cell  of the tile on a diamond array; default: an

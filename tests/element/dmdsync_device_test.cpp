@@ -211,6 +211,16 @@ TEST (DmdsyncDevice, AScheduleThatCannotBeReadIsAnErrorBeforeTheDeviceIs)
   EXPECT_NE (device.error ().find ("2x9999"), std::string::npos);
 }
 
+TEST (DmdsyncDevice, HasOneOwner)
+{
+  Device owner ("device=sim:owned"), second ("device=sim:owned");
+  ASSERT_EQ (owner.set_state (GST_STATE_READY), GST_STATE_CHANGE_SUCCESS);
+  EXPECT_EQ (second.set_state (GST_STATE_READY), GST_STATE_CHANGE_FAILURE);
+  EXPECT_NE (second.error ().find ("sim:owned is in use"), std::string::npos);
+  owner.set_state (GST_STATE_NULL);
+  EXPECT_EQ (second.set_state (GST_STATE_READY), GST_STATE_CHANGE_SUCCESS);
+}
+
 TEST (DmdsyncDevice, AFailedUploadEndsInOneErrorWithTheMirrorsParked)
 {
   Device device ("device=sim:no-upload,fail=upload");

@@ -159,10 +159,11 @@ TEST (DiamondLattice, ATilePixelIsTheMirrorAtItsPlace)
 TEST (SimulatedDiamond, CarriesItsLayoutToTheBench)
 {
   const auto mirrors = SimulatedMirrors::find ("diamond");
-  const auto dmd = open_simulated_dmd ("sim:diamond,layout=cell");
+  auto dmd = open_simulated_dmd ("sim:diamond,layout=cell");
   ASSERT_TRUE (dmd.ok ());
   EXPECT_EQ ((*dmd)->info ().array, Array::diamond);
   EXPECT_EQ (mirrors->shape ().diamond, MirrorLayout::cell);
+  dmd->reset ();
   const auto plain = open_simulated_dmd ("sim:diamond");
   EXPECT_EQ (mirrors->shape ().diamond, std::nullopt);
   EXPECT_FALSE (open_simulated_dmd ("sim:diamond,layout=x").ok ());

@@ -261,7 +261,7 @@ TEST_F (SimulatedDmd, FailsWhereItIsAskedTo)
   ASSERT_TRUE (starts->upload (Schedule (), {}, ignore_progress));
   EXPECT_FALSE (starts->start (plan));
 
-  const auto restarts = *open_dmd ("sim:fails,fail=restart");
+  const auto restarts = *open_dmd ("sim:fails-again,fail=restart");
   ASSERT_TRUE (restarts->upload (Schedule (), {}, ignore_progress));
   EXPECT_TRUE (restarts->start (plan));
   EXPECT_FALSE (restarts->start (plan));

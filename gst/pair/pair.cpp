@@ -35,7 +35,9 @@
  * In a live pipeline, a coded frame waits for its partner as long as the
  * latency of the slower camera and a quarter of a frame period allow, and then
  * goes alone. The property `latency` adds to that: a pipeline that records, and
- * nobody looks at, can wait for a second (latency=1000000000).
+ * nobody looks at, can wait for a second (latency=1000000000). A frame of the
+ * second camera waits for a second longer, and is then dropped, so that its
+ * source goes on while the first camera is silent.
  *
  * ## Drift
  *
@@ -106,6 +108,9 @@ namespace
 
 /* Wrong pairs in a row that are no accident. */
 constexpr guint64 kOutOfStep = 8;
+
+/* Beyond the latency, for a first camera that is silent. */
+constexpr GstClockTime kPatience = GST_SECOND;
 
 /* Why a coded frame goes on alone, or how sure it is that it does not. */
 enum class Alone { no, surely_not, missing, damaged, other_exposure };
@@ -316,6 +321,17 @@ push (GstCodedExposurePair *self, BufferPtr coded, BufferPtr partner)
   return gst_aggregator_finish_buffer (aggregator, coded.release ());
 }
 
+/* The frames of the second camera that waited until now. */
+void
+drop_unwanted (GstCodedExposurePair *self)
+{
+  const BufferPtr frame (gst_aggregator_pad_pop_buffer (sink (self, "off")));
+  if (!frame)
+    return;
+  locked (self, [&] { return ++state (self).counters.dropped; });
+  take_alone (self, frame.get (), true);
+}
+
 GstFlowReturn
 aggregate (GstAggregator *aggregator, gboolean late)
 {
@@ -324,12 +340,17 @@ aggregate (GstAggregator *aggregator, gboolean late)
   if (state (self).refused)
     return GST_FLOW_ERROR;
   const BufferPtr head (gst_aggregator_pad_peek_buffer (on));
-  if (!head && !gst_aggregator_pad_is_eos (on))
+  const bool is_silent = state (self).is_silent;
+  if (!head && !gst_aggregator_pad_is_eos (on)) {
+    if (late && is_silent)
+      drop_unwanted (self);
     return GST_AGGREGATOR_FLOW_NEED_DATA;
+  }
   if (!head)
     return end (self);
   BufferPtr partner;
-  if (take_partner (self, head.get (), late, partner) == Found::kWait)
+  if (take_partner (self, head.get (), late && !is_silent, partner) ==
+      Found::kWait)
     return GST_AGGREGATOR_FLOW_NEED_DATA;
   if (partner && !check_depth (self))
     return GST_FLOW_ERROR;
@@ -338,14 +359,18 @@ aggregate (GstAggregator *aggregator, gboolean late)
                : GST_AGGREGATOR_FLOW_NEED_DATA;
 }
 
-/* A coded frame that waits; without one, there is nothing to be late for. */
+/* Of a coded frame that waits, or else of one of the second camera. */
 GstClockTime
 next_time (GstAggregator *aggregator)
 {
-  GstAggregatorPad *on = sink (aggregator, "on");
-  const BufferPtr head (gst_aggregator_pad_peek_buffer (on));
-  return head ? running_time (segment_at (on), GST_BUFFER_PTS (head.get ()))
-              : GST_CLOCK_TIME_NONE;
+  bool &is_silent = state (aggregator).is_silent;
+  is_silent = !gst_aggregator_pad_has_buffer (sink (aggregator, "on"));
+  GstAggregatorPad *pad = sink (aggregator, is_silent ? "off" : "on");
+  const BufferPtr head (gst_aggregator_pad_peek_buffer (pad));
+  const GstClockTime time =
+      head ? running_time (segment_at (pad), GST_BUFFER_PTS (head.get ()))
+           : GST_CLOCK_TIME_NONE;
+  return is_silent && GST_CLOCK_TIME_IS_VALID (time) ? time + kPatience : time;
 }
 
 GstFlowReturn

@@ -37,6 +37,7 @@ struct Run {
   bool has_ended = false; ///< the next frame is none
   bool check_due = false; ///< a stream is another
   bool refused = false;   ///< an error was posted
+  bool is_silent = false; ///< no coded frame is there to be late for
   PairCheck check;
   AloneFrames alone;
   guint64 refused_in_a_row = 0;

@@ -318,6 +318,20 @@ TEST (PairLive, AFrameWaitsForItsPartnerAndThenGoesAlone)
   EXPECT_FALSE (get_partner (next.get ()));
   const ObjectPtr<GstTestClock> clock (gst_harness_get_testclock (pair.get ()));
   EXPECT_EQ (gst_clock_get_time (GST_CLOCK (clock.get ())), kPeriod + 15 * kMs);
+
+  /* The first camera is silent. */
+  for (guint64 k = 2; k < 5; k++) {
+    gst_harness_push (off.get (), numbered (k, k * kPeriod).release ());
+    ASSERT_TRUE (gst_harness_crank_single_clock_wait (pair.get ()));
+    EXPECT_EQ (gst_clock_get_time (GST_CLOCK (clock.get ())),
+        k * kPeriod + 15 * kMs + GST_SECOND);
+  }
+  pair.push (numbered (30, 30 * kPeriod));
+  gst_harness_push (off.get (), numbered (30, 30 * kPeriod).release ());
+  next.reset (gst_harness_pull (pair.get ()));
+  ASSERT_TRUE (next);
+  EXPECT_TRUE (get_partner (next.get ()));
+  EXPECT_EQ (property<guint64> (pair.element (), "partners-dropped"), 3u);
 }
 
 } // namespace

@@ -88,6 +88,7 @@ struct KeepState {
   std::optional<guint64> last; ///< number of a frame
   int tagged_bits = 0;
   bool has_new_segment = false; ///< since the last frame
+  bool said_no_time = false;    ///< of a frame, in this run
 
   /** Of what follows; taken after the object lock where both are held. Never
    * held while it writes or posts. */
@@ -279,6 +280,11 @@ transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
   auto *self = as<GstCodedExposureKeep> (base);
   KeepState &state = self->state;
   const GstClockTime pts = GST_BUFFER_PTS (frame);
+  if (!GST_CLOCK_TIME_IS_VALID (pts) &&
+      !std::exchange (state.said_no_time, true))
+    POST_WARNING (self, STREAM, FORMAT,
+        "A coded frame has no time stamp (PTS), and such frames are not kept. "
+        "Let the source set one, for example with do-timestamp=true.");
   if (!GST_CLOCK_TIME_IS_VALID (pts) || !state.info)
     return GST_FLOW_OK;
   if (!holds_frame (base, *state.info, frame))
@@ -381,6 +387,7 @@ begin_run (GstElement *element)
   if (rule)
     state.events.emplace (*rule);
   state.last.reset ();
+  state.said_no_time = false;
   return true;
 }
 

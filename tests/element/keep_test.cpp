@@ -424,6 +424,17 @@ TEST_F (Keep, TheTagsSayTheBitsOfFramesWithoutMetadata)
   end ();
 }
 
+TEST_F (Keep, FramesWithoutATimeAreSaidOnce)
+{
+  begin ();
+  for (int k = 0; k < 3; k++)
+    ASSERT_EQ (keep_->push (frame_of (
+                   Image<std::uint8_t> (kSide, kSide), GST_CLOCK_TIME_NONE)),
+        GST_FLOW_OK);
+  EXPECT_NE (keep_->warning ().find ("no time stamp"), std::string::npos);
+  EXPECT_EQ (keep_->warning (), "");
+}
+
 TEST_F (Keep, WhatCannotBeWrittenIsSaid)
 {
   begin ();

@@ -227,11 +227,11 @@ CameraTracks::add_frames (GstPad *pad, const FrameReading &how)
       "max-size-bytes", 0u, "max-size-time", kNoLimit, nullptr);
   gst_bin_add (GST_BIN (element_), queue_);
   if (decoder_) {
-    gst_element_link_pads (decoder_, "src", restore_, "sink");
+    gst_element_link_pads (decoder_, "src", restore (), "sink");
     gst_element_link_pads (queue_, "src", decoder_, "sink");
     gst_element_sync_state_with_parent (decoder_);
   } else
-    gst_element_link_pads (queue_, "src", restore_, "sink");
+    gst_element_link_pads (queue_, "src", restore (), "sink");
   gst_element_sync_state_with_parent (queue_);
   gst_pad_link_full (
       pad, pad_of (queue_, "sink").get (), GST_PAD_LINK_CHECK_NOTHING);
@@ -278,24 +278,32 @@ CameraTracks::tell_left_segments ()
 void
 CameraTracks::add_lines (GstPad *pad)
 {
-  gst_pad_link (pad, pad_of (restore_, "track").get ());
+  gst_pad_link (pad, pad_of (restore (), "track").get ());
 }
 
 void
 CameraTracks::begin (Nanoseconds tick)
 {
-  restore_ = make_part (gst_coded_exposure_restore_get_type ());
+  restore_.reset (GST_ELEMENT (gst_object_ref_sink (
+      make_part (gst_coded_exposure_restore_get_type ()))));
   set_tick (tick);
   g_signal_connect (
-      restore_, "frames-queued", G_CALLBACK (frames_queued), this);
-  gst_bin_add (GST_BIN (element_), restore_);
-  gst_element_sync_state_with_parent (restore_);
+      restore (), "frames-queued", G_CALLBACK (frames_queued), this);
+}
+
+void
+CameraTracks::add_restore ()
+{
+  if (!gst_object_has_as_parent (
+          GST_OBJECT (restore ()), GST_OBJECT (element_)))
+    gst_bin_add (GST_BIN (element_), restore ());
+  gst_element_sync_state_with_parent (restore ());
 }
 
 void
 CameraTracks::set_tick (Nanoseconds tick)
 {
-  g_object_set (restore_, "tick", guint64 (tick), nullptr);
+  g_object_set (restore (), "tick", guint64 (tick), nullptr);
 }
 
 void
@@ -312,7 +320,9 @@ void
 CameraTracks::remove ()
 {
   end ();
-  remove_part (element_, restore_);
+  GstElement *part = restore ();
+  remove_part (element_, part);
+  restore_.reset ();
 }
 
 } // namespace codedexposure::gst

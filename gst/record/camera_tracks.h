@@ -30,10 +30,13 @@ public:
   /** In the bin @p element. */
   explicit CameraTracks (GstElement *element) : element_ (element) {}
 
-  /** Adds the part restore, which has frames and lines come together. */
+  /** Makes the part restore, which has frames and lines come together. */
   void begin (Nanoseconds tick);
+  /** Adds it to the bin. Before a run, its pads are not linked yet, and
+   * gst_parse_bin_from_description () would take them for those of its bin. */
+  void add_restore ();
   /** Null: not begun. */
-  GstElement *restore () const { return restore_; }
+  GstElement *restore () const { return restore_.get (); }
   /** To which the container rounds times. */
   void set_tick (Nanoseconds tick);
 
@@ -69,7 +72,7 @@ private:
   bool make_decoder (GstPad *pad, const GstCaps *caps, const FrameReading &how);
 
   GstElement *element_;
-  GstElement *restore_ = nullptr;
+  ObjectPtr<GstElement> restore_;
   GstElement *queue_ = nullptr, *decoder_ = nullptr;
   Deep deep_;
   GstClockTime decoded_ = GST_CLOCK_TIME_NONE; ///< time of the last frame

@@ -451,6 +451,17 @@ properties ()
 
 constexpr StateHooks kRun{.begin = begin_run, .end = end_run};
 
+/* It has one, `partner`. */
+GstPad *
+request_new_pad (
+    GstElement *self, GstPadTemplate *, const gchar *, const GstCaps *) noexcept
+{
+  GstPad *pad = add_pad (self, "partner");
+  gst_pad_use_fixed_caps (pad);
+  state_in<GstCodedExposureLog> (self).partners.take_over (pad);
+  return pad;
+}
+
 void
 set_up (gpointer klass)
 {
@@ -464,7 +475,9 @@ set_up (gpointer klass)
       {});
   add_part_templates (klass);
   add_pad_template (klass, "track", {.caps = "text/x-raw,format=utf8"});
-  add_pad_template (klass, "partner", {.caps = kPartCaps});
+  add_pad_template (
+      klass, "partner", {.presence = GST_PAD_REQUEST, .caps = kPartCaps});
+  GST_ELEMENT_CLASS (klass)->request_new_pad = request_new_pad;
 
   auto *transform_class = GST_BASE_TRANSFORM_CLASS (klass);
   transform_class->set_caps = GST_DEBUG_FUNCPTR (set_caps);
@@ -478,9 +491,6 @@ set_up_instance (GstCodedExposureLog *self)
   gst_base_transform_set_passthrough (GST_BASE_TRANSFORM (self), TRUE);
   self->state.track = add_pad (GST_ELEMENT (self), "track");
   gst_pad_use_fixed_caps (self->state.track);
-  GstPad *partners = add_pad (GST_ELEMENT (self), "partner");
-  gst_pad_use_fixed_caps (partners);
-  self->state.partners.take_over (partners);
 }
 
 } // namespace

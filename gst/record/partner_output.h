@@ -19,7 +19,7 @@ class PartnerOutput
 public:
   /** @p pad: of the element. */
   void take_over (GstPad *pad) { pad_ = pad; }
-  bool is_linked () const { return gst_pad_is_linked (pad_); }
+  bool is_linked () const { return pad_ && gst_pad_is_linked (pad_); }
 
   /** Before a run. */
   void restart ();

@@ -188,6 +188,7 @@ add_partner (Self *self)
   if (!video || !text || !state.coded.has_frames ())
     return;
   state.partner.begin (state.stream.head ? state.stream.head->tick : 1);
+  state.partner.add_restore ();
   gst_element_link_pads (
       state.partner.restore (), "src", state.coded.restore (), "partner");
   state.partner.add_lines (text);
@@ -400,6 +401,9 @@ begin_run (GstElement *self)
   auto &state = state_in<Self> (self);
   state.stream = {};
   state.has_new_frame = false;
+  state.coded.add_restore ();
+  gst_ghost_pad_set_target (GST_GHOST_PAD (pad_of (self, "src").get ()),
+      pad_of (state.coded.restore (), "src").get ());
   /* Before the demuxer, to which it is not linked yet. */
   if (state.file)
     return gst_element_set_state (state.coded.restore (), GST_STATE_PAUSED) !=
@@ -479,7 +483,7 @@ set_up_instance (Self *self)
   GstElement *restore = state.coded.restore ();
   add_demuxer (self);
   add_ghost_pad (GST_ELEMENT (self), "sink", state.file);
-  add_ghost_pad (GST_ELEMENT (self), "src", restore);
+  add_ghost_pad (GST_ELEMENT (self), "src", nullptr);
   gst_pad_add_probe (pad_of (restore, "src").get (), GST_PAD_PROBE_TYPE_BUFFER,
       on_frame, self, nullptr);
 }

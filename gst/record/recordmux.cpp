@@ -181,6 +181,7 @@ add_branch (GstElement *self, Branch &branch)
     return;
   branch.request_from (state.mux);
   gst_pad_link (pad_of (branch.lines, "src").get (), branch.text);
+  link_frames (branch, branch.video);
 }
 
 bool
@@ -192,27 +193,29 @@ add_encoder (GstElement *self, Branch &branch, guint threads)
     return false;
   }
   gst_bin_add (GST_BIN (self), branch.encoder);
+  gst_pad_unlink (pad_of (branch.frames, "src").get (), branch.video);
   return link_frames (branch, pad_of (branch.encoder, "sink").get ()) &&
          gst_pad_link (pad_of (branch.encoder, "src").get (), branch.video) ==
              GST_PAD_LINK_OK;
 }
 
-/* From its queue of frames to the muxer. */
 bool
 begin_branch (GstElement *self, Branch &branch, const Settings &settings)
 {
   branch.restart ();
-  return settings.codec == Codec::ffv1
-             ? add_encoder (self, branch, settings.threads)
-             : link_frames (branch, branch.video);
+  return settings.codec != Codec::ffv1 ||
+         add_encoder (self, branch, settings.threads);
 }
 
+/* Of pads that are not linked, gst_parse_bin_from_description () would make
+ * those of its bin. */
 void
-end_branch (GstElement *self, Branch &branch)
+end_encoder (GstElement *self, Branch &branch)
 {
-  if (!branch.encoder && branch.video)
-    gst_pad_unlink (pad_of (branch.frames, "src").get (), branch.video);
+  if (!branch.encoder)
+    return;
   remove_part (self, branch.encoder);
+  link_frames (branch, branch.video);
 }
 
 /* That of the second camera; frames with partners come, and none came yet. */
@@ -241,7 +244,7 @@ remove_partner (GstElement *self)
   Branch &branch = state.partner;
   if (!branch.log)
     return;
-  end_branch (self, branch);
+  end_encoder (self, branch);
   for (GstElement **part : {&branch.log, &branch.frames, &branch.lines})
     remove_part (self, *part);
   for (GstPad *pad : {branch.video, branch.text})
@@ -342,10 +345,8 @@ follow_caps (GstElement *self, GstEvent *event)
     POST_ERROR (self, STREAM, FORMAT,
         "The frames are encoded already. Set codec=copy to record them as they "
         "come, or decode them before this element.");
-  if (!state.has_begun && branch.encoder && !ffv1_keeps (caps_of (event))) {
-    remove_part (self, branch.encoder);
-    link_frames (branch, branch.video);
-  }
+  if (!state.has_begun && !ffv1_keeps (caps_of (event)))
+    end_encoder (self, branch);
   return GST_PAD_PROBE_OK;
 }
 
@@ -411,7 +412,7 @@ void
 end_run (GstElement *self)
 {
   remove_partner (self);
-  end_branch (self, state_in<Self> (self).coded);
+  end_encoder (self, state_in<Self> (self).coded);
 }
 
 /* The inner muxer refuses seeks, which are for the source of the frames; it

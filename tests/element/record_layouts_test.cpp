@@ -220,6 +220,24 @@ TEST (RecordedFrames, ThatComeBackwardsAreAnErrorThatSaysSo)
   EXPECT_NE (pipeline.play ().find ("played forwards"), std::string::npos);
 }
 
+TEST (RecordBins, OfADescriptionHaveThePadOfItsFirstElement)
+{
+  for (const char *element :
+      {"codedexposure-recordmux", "codedexposure-recorddemux"}) {
+    const std::string description =
+        std::string ("queue name=first ! ") + element + " ! fakesink";
+    const ObjectPtr<GstElement> bin (GST_ELEMENT (gst_object_ref_sink (
+        gst_parse_bin_from_description (description.c_str (), TRUE, nullptr))));
+    const auto sink = pad_of (bin.get (), "sink");
+    ASSERT_TRUE (sink);
+    const ObjectPtr<GstPad> target (
+        gst_ghost_pad_get_target (GST_GHOST_PAD (sink.get ())));
+    const ObjectPtr<GstElement> owner (
+        gst_pad_get_parent_element (target.get ()));
+    EXPECT_STREQ (GST_OBJECT_NAME (owner.get ()), "first");
+  }
+}
+
 TEST (RecordSegments, BeginWhileTheLastOneIsFinished)
 {
   const std::string path =

@@ -292,11 +292,14 @@ TEST_F (RecordPairs, FramesAfterASeekHaveTheirs)
 struct HeldEnd {
   std::promise<void> coded;
   bool was_held = false, was_last = false;
+  bool has_first = false; ///< the part of the first camera was added
 
   void follow (const Pipeline &pipeline)
   {
     const auto added = [] (GstBin *, GstElement *part, gpointer self) {
-      if (std::string (G_OBJECT_TYPE_NAME (part)) == "GstCodedExposureRestore")
+      if (std::string (G_OBJECT_TYPE_NAME (part)) ==
+              "GstCodedExposureRestore" &&
+          std::exchange (static_cast<HeldEnd *> (self)->has_first, true))
         gst_pad_add_probe (pad_of (part, "sink").get (),
             GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, hold, self, nullptr);
     };

@@ -79,6 +79,22 @@ DamageReport::frames_missing (guint64 count, GstClockTime from)
 }
 
 void
+DamageReport::frames_missing_between (GstClockTime from, GstClockTime until,
+    guint64 count, const GstSegment &segment, guint32 seqnum)
+{
+  const auto asked = SeekBook::find (this, seqnum);
+  const auto is_asked = [&] (GstClockTime pts) {
+    const guint64 time =
+        gst_segment_to_stream_time (&segment, GST_FORMAT_TIME, pts);
+    return !asked || (GST_CLOCK_TIME_IS_VALID (time) &&
+                         time + kRounding >= asked->start &&
+                         time + kRounding < asked->stop);
+  };
+  if (is_asked (from) && is_asked (until))
+    frames_missing (count, from + (until - from) / (count + 1));
+}
+
+void
 DamageReport::stream_cut ()
 {
   const guint64 frames = locked (element_, [&] { return counters_.frames; });

@@ -39,6 +39,11 @@ public:
   /** @p count frames of the track, from @p from on, did not come; 0: says
    * nothing. */
   void frames_missing (guint64 count, GstClockTime from);
+  /** The same of @p count frames without lines between two at @p from and
+   * @p until, unless the gap reaches beyond the part that was asked for: then
+   * it is not known how many were in it. */
+  void frames_missing_between (GstClockTime from, GstClockTime until,
+      guint64 count, const GstSegment &segment, guint32 seqnum);
   /** The next frame, if any, is as recorded. */
   void end_sequence ();
   /** The last line of the track did not come. */

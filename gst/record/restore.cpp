@@ -226,6 +226,11 @@ restore (Self *self, GstBuffer *frame, const TrackReader::Match &match)
   /* A demuxer sets it after each seek. */
   GST_BUFFER_FLAG_UNSET (frame, GST_BUFFER_FLAG_DISCONT);
   apply_record (frame, record, match.offset);
+  /* Those of a whole recording are counted at its end. */
+  const guint64 lost = match.line->frame->lost_before.value_or (0);
+  if (!state.whole && match.skipped == 0 && gap > lost)
+    state.damage.frames_missing_between (state.last_pts, GST_BUFFER_PTS (frame),
+        gap - lost, state.segment, state.segment_seqnum);
   if (record.hash && state.encoded)
     carry_hash (frame, *record.hash);
   if (state.last_frame && record.frame > *state.last_frame)

@@ -264,12 +264,17 @@ def outcome(store, made):
 
 
 def result(store, made):
-    damaged = [recording.inputs for number, recording in enumerate(made.recordings)
-               if (read_json(store.merged(number)) or {}).get('status')]
-    for inputs in damaged:
-        print(f'{inputs} is cut off or damaged; what could be decoded was, and '
-              'pictures of damaged frames are flagged')
-    return 3 if damaged else 0
+    status = 0
+    for number, recording in enumerate(made.recordings):
+        said = read_json(store.merged(number)) or {}
+        if not said.get('status'):
+            continue
+        status = said['status']
+        lost = said['counts']['lost']
+        print(f'{recording.inputs} is cut off or damaged; what could be decoded was' +
+              (f', {lost} coded {"frame is" if lost == 1 else "frames are"} lost'
+               if lost else '') + ', and pictures of damaged frames are flagged')
+    return status
 
 
 def verify(store, made):
@@ -286,7 +291,7 @@ def verify(store, made):
         pictures += said['counts']['pictures']
     print(f'{len(made.recordings) - bad} of {len(made.recordings)} recordings are '
           f'as merged: {coded} coded frames, each with its pictures exactly once '
-          f'({pictures}); {lost} {"was" if lost == 1 else "were"} lost before recording')
+          f'({pictures}); {lost} {"was" if lost == 1 else "were"} lost')
     return 1 if bad else 0
 
 

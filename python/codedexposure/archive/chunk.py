@@ -17,9 +17,9 @@ from .store import (Problem, digest, fingerprint, read_json, write_json)
 
 TABLE = 'statistics.csv'
 FOR_OUTPUT = '--deflate', '--white'  # for other forms than lossless video
-DONE, DAMAGED = 0, 3  # of decode
+DONE, FAILED, DAMAGED = 0, 1, 3  # of decode
 COUNTED = 'frames', 'not_coded', 'lost', 'pictures'  # by decode
-NUMBERS = *COUNTED, 'status', 'seconds', 'cpu_seconds'  # of a manifest
+NUMBERS = *COUNTED, 'unread', 'status', 'seconds', 'cpu_seconds'  # of a manifest
 ENGINE_NAMES = 'SLURM_ARRAY_JOB_ID', 'SLURM_ARRAY_TASK_ID', 'PARALLEL_SEQ'
 
 
@@ -157,16 +157,19 @@ def decode(plan, recording, chunk, scratch):
     check_source(source)
     begun, cpu = time.time(), cpu_seconds()
     status, said = programs.run(command(plan, recording, chunk, scratch), log)
+    expected = source.frames_of(chunk, plan.length)
+    # None of its frames can be decoded, but those of other chunks may be.
+    if (status == FAILED and said and said['damaged'] and 'error' not in said
+            and not said['frames'] and source.chunks > 1):
+        status, said['missing'] = DAMAGED, expected
     if status not in (DONE, DAMAGED) or said is None:
         raise Problem(f'decode ended with status {status}')
     check_source(source)
-    expected = source.frames_of(chunk, plan.length)
     # What is too damaged to be decoded is lost. The numbers of frames do not show
     # it before the first frame and after the last one.
-    if status == DAMAGED:
-        said['lost'] = max(said['lost'],
-                           min(said['missing'], expected - said['frames']))
-    found = said['frames'] + (said['lost'] if status == DAMAGED else 0)
+    unread = (min(said['missing'], expected - said['frames'])
+              if status == DAMAGED else 0)
+    found = said['frames'] + (max(said['lost'], unread) if status == DAMAGED else 0)
     if found < expected:
         raise Problem(f'decode read {found} of the {expected} coded frames of this '
                       'chunk')
@@ -174,7 +177,7 @@ def decode(plan, recording, chunk, scratch):
     manifest.update(
         outputs={name: digest(os.path.join(scratch, name))
                  for name in outputs_of(plan, recording, said['pictures'])},
-        **{name: said[name] for name in COUNTED}, status=status,
+        **{name: said[name] for name in COUNTED}, unread=unread, status=status,
         host=socket.gethostname(),
         begun=begun, seconds=time.time() - begun, cpu_seconds=cpu_seconds() - cpu,
         engine={name: os.environ[name] for name in ENGINE_NAMES

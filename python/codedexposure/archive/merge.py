@@ -157,8 +157,8 @@ def merge(store, plan, recording):
     parts, outputs = files(chunks.name_of(form)), outputs_of(store, plan, recording)
     output, counts = outputs[0], counted(manifests)
     if not parts:
-        raise Problem(f'{source.path} has no picture: during all its frames, the '
-                      'mirrors show a pattern')
+        raise Problem(f'{source.path} has no picture: during all its frames that '
+                      'can be decoded, the mirrors show a pattern')
     os.makedirs(os.path.dirname(output.rstrip('/')), exist_ok=True)
     with tempfile.TemporaryDirectory(dir=store.parts(recording)) as scratch:
         if form == 'png':
@@ -186,8 +186,10 @@ def merge(store, plan, recording):
 
 
 def counted(manifests):
-    """Of all chunks; the frames that are decoded have pictures."""
+    """Of all chunks; the frames that are decoded have pictures. What could not be
+    decoded at the end of a chunk may be lost before the next one, too."""
     counts = {name: sum(m[name] for m in manifests) for name in chunks.COUNTED}
+    counts['lost'] = max(counts['lost'], sum(m['unread'] for m in manifests))
     counts['coded'] = counts['frames'] - counts['not_coded']
     return counts
 

@@ -23,9 +23,12 @@ class Frames(Sequence):
     len (), an index and a part first need to know the times of all coded
     frames, for which the recording is read once without decoding it.
 
-    An index counts frames that are there, not those that were lost: compare
-    Frame.frame. Where the schedule changes, coded frames do not give equally
-    many pictures, and only a loop is possible.
+    len () and an index count frames that are recorded, not those that were
+    lost: compare Frame.frame. Only decoding tells that a recorded frame cannot
+    be decoded: its index and a part with it raise Error, and a loop over all
+    frames, before and after len (), leaves it out with a RecordingWarning. Where
+    the schedule changes, coded frames do not give equally many pictures, and
+    only a loop is possible.
     """
 
     def __init__(self, recording: Recording, decoder: str,
@@ -58,11 +61,12 @@ class Frames(Sequence):
                     times[1] if len(times) > 1 else None))
         return self._per_frame
 
+    def _whole(self) -> range:
+        times = self._times()
+        return range(self._count() * len(times) if times else 0)
+
     def _range(self) -> range:
-        if self._part is None:
-            times = self._times()
-            self._part = range(self._count() * len(times) if times else 0)
-        return self._part
+        return self._whole() if self._part is None else self._part
 
     def between(self, start: float, stop: float | None = None) -> Frames:
         """Those of the coded frames that begin in [start, stop), in seconds
@@ -75,8 +79,7 @@ class Frames(Sequence):
         if start < 0 or (stop is not None and stop < start):
             raise ValueError(f"a part is from 0 or later to its start or later, "
                              f"not from {start} to {stop}")
-        if self._part is not None and self._part != range(
-                self._count() * len(self._times())):
+        if self._part is not None and self._part != self._whole():
             raise ValueError("these frames are a part already; take one of the "
                              "whole recording")
         times = self._times()
@@ -126,6 +129,5 @@ class Frames(Sequence):
             yield frame
         if given < len(part):
             raise Error(
-                f"{self._recording.path}: coded frames {first} to {last} give "
-                f"fewer pictures than {count} each; read them in a loop over "
-                "all frames")
+                f"{self._recording.path}: of coded frames {first} to {last}, some "
+                "cannot be decoded; read the others in a loop over all frames")

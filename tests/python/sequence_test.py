@@ -3,6 +3,7 @@
 """Frames of a recording by index and slice are those of a loop."""
 import re
 import subprocess
+import sys
 import unittest
 from unittest import mock
 import warnings
@@ -108,6 +109,27 @@ class Sequence(unittest.TestCase):
                 mock.patch.object(Gst.Pipeline, "seek", seek_late):
             warnings.simplefilter("error")
             list(opened("camera.mkv").coded()[1:3])
+
+    def test_a_frame_that_cannot_be_decoded(self):
+        subprocess.run([sys.executable, ROOT / "tests/support/matroska.py", "spoil",
+                        "plain.mkv", "spoiled.mkv", "7"], cwd=SCRATCH, check=True)
+        recording = opened("spoiled.mkv")
+        for frames in recording.coded(), recording.subframes():
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", codedexposure.RecordingWarning)
+                before = [frame.time_ns for frame in frames]
+                each = len(before) // 59
+                self.assertEqual(len(frames), 60 * each)
+                # What was asked before does not change the loop.
+                self.assertEqual([frame.time_ns for frame in frames], before)
+                self.assertEqual(frames[8 * each].frame, 8)
+                with self.assertRaisesRegex(codedexposure.Error,
+                                            "some cannot be decoded"):
+                    list(frames[5 * each:9 * each])
+                with self.assertRaises(codedexposure.Error):
+                    frames[7 * each]  # pylint: disable=pointless-statement
+            with self.assertWarnsRegex(codedexposure.RecordingWarning, "missing: 1"):
+                list(frames)
 
     def check_uncountable(self, name, why):
         recording = opened(name)

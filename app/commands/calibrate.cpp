@@ -28,12 +28,14 @@ public:
   Exit run ();
 
 private:
+  void check () const;
   void set_up_bench ();
   void set_up_second (SourceOptions &second) const;
   void set_up_device (const SourcePlan &plan);
   std::string sink () const;
   void write (Job &job, GstElement *calib) const;
 
+  const Options *declared_ = nullptr;
   SourceOptions source_;
   RunOptions run_;
   std::string output_ = "mapping.json";
@@ -73,6 +75,7 @@ Calibrate::text ()
 void
 Calibrate::declare (Options &options)
 {
+  declared_ = &options;
   options.heading ("");
   options.value ("--output", output_, "FILE.json", "the mapping [mapping.json]",
       file_ending_in (".json"));
@@ -102,6 +105,22 @@ Calibrate::declare (Options &options)
   source_.declare (options);
   run_.declare (options);
   beside_.declare_relations (options);
+}
+
+/* What the relations between options cannot say. */
+void
+Calibrate::check () const
+{
+  if (stage_ == "simulated" && !source_.is_simulated ())
+    usage_error ("--stage simulated needs the simulated bench; leave out "
+                 "--camera and --source");
+  for (const char *name : {"--output", "--report", "--second", "--force"})
+    if (mode_ == "align" && declared_->has (name))
+      usage_error (std::string (name) + " is for a mapping, which --mode align "
+                                        "does not measure; leave one of them "
+                                        "out");
+  if (second_)
+    beside_.check (source_);
 }
 
 /* A bench that was just assembled, in white light that stays below the largest
@@ -180,12 +199,8 @@ Calibrate::write (Job &job, GstElement *calib) const
 Exit
 Calibrate::run ()
 {
+  check ();
   const bool simulated = source_.is_simulated ();
-  if (stage_ == "simulated" && !simulated)
-    usage_error ("--stage simulated needs the simulated bench; leave out "
-                 "--camera and --source");
-  if (second_)
-    beside_.check (source_);
   start_gstreamer ();
   if (simulated)
     set_up_bench ();
@@ -207,7 +222,8 @@ Calibrate::run ()
   set_if (settings, "tolerance", tolerance_);
   chain.to ("moirecalib", settings);
   GstElement *calib = chain.last ();
-  write (job, calib);
+  if (mode_ != "align")
+    write (job, calib);
   chain.queue (2, "downstream");
   add_view (chain, source_.bits);
   /* A window that is made larger shows a larger picture. */

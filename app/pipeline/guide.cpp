@@ -31,8 +31,7 @@ constexpr double kMovePart = 0.9;
 constexpr std::pair<std::string_view, const char *> kStates[] = {
     {"searching", "searching for the grating: focus, and place the camera "
                   "roughly in front of the mirrors"},
-    {"coarse", "coarse: move the stage as the arrows show, the angle first; "
-               "press Enter to start the mapping now"},
+    {"coarse", "coarse: move the stage as the arrows show, the angle first"},
     {"fine", "fine: no pixel is off by more than one mirror; continue"},
     {"aligned", "aligned: do not touch the stage"},
     {"mapping", "showing patterns; do not touch the bench"},
@@ -49,6 +48,7 @@ public:
 
 private:
   gboolean take_key ();
+  bool is_alignment () const;
   bool is_done ();
   Exit judge (const RunResult &run);
   void end () const
@@ -86,7 +86,7 @@ Guide::Guide (Job &job, GstElement *calib, GstElement *stage)
   const auto on_key = [] (gint, GIOCondition, gpointer self) {
     return static_cast<Guide *> (self)->take_key ();
   };
-  if (isatty (STDIN_FILENO) != 0)
+  if (isatty (STDIN_FILENO) != 0 && !is_alignment ())
     keys_ = g_unix_fd_add (STDIN_FILENO, G_IO_IN, on_key, this);
 }
 
@@ -112,16 +112,21 @@ Guide::take_key ()
   return G_SOURCE_CONTINUE;
 }
 
-/* With mode=align, the user ends the program, and the last reading is the
- * result. */
 bool
-Guide::is_done ()
+Guide::is_alignment () const
 {
   GValue mode = G_VALUE_INIT;
   g_object_get_property (G_OBJECT (calib_), "mode", &mode);
   const CharPtr text (gst_value_serialize (&mode));
   g_value_unset (&mode);
-  if (std::string_view (text.get ()) != "align" || last_reading_.empty ())
+  return std::string_view (text.get ()) == "align";
+}
+
+/* The user ends an alignment, and the last reading is its result. */
+bool
+Guide::is_done ()
+{
+  if (!is_alignment () || last_reading_.empty ())
     return mapped_;
   status_.line (last_reading_);
   return true;
@@ -132,7 +137,10 @@ Guide::on_state (const std::string &state)
 {
   for (const auto &[name, meaning] : kStates)
     if (state == name)
-      status_.line (meaning);
+      status_.line (
+          meaning + std::string (keys_ != 0 && state == "coarse"
+                                     ? "; press Enter to start the mapping now"
+                                     : ""));
   tried_ |= state == "mapping";
   if (state == "failed" && keys_ != 0)
     status_.line ("the mapping failed; correct the bench and press Enter to "

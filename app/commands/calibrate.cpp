@@ -222,6 +222,7 @@ Calibrate::run ()
   set_if (settings, "tolerance", tolerance_);
   chain.to ("moirecalib", settings);
   GstElement *calib = chain.last ();
+  job.counted = calib;
   if (mode_ != "align")
     write (job, calib);
   chain.queue (2, "downstream");

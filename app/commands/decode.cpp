@@ -290,7 +290,9 @@ Decode::build (Job &job)
     Chain chain = pads.coded ();
     keep_times (chain.to ("queue").last ());
     count_flags (chain.last (), *coded_);
+    how.is_coded = true;
     write_video (job, chain, *coded_, how);
+    how.is_coded = false;
   }
   if (uncertainty_) {
     Chain chain = pads.uncertainty ();

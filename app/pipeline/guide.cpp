@@ -80,6 +80,7 @@ Guide::Guide (Job &job, GstElement *calib, GstElement *stage)
       status_ (job.command, job.options.verbose)
 {
   job.ends_by_signal = true;
+  job.has_progress = false; // readings are shown
   job.on_message = [this] (
                        const GstStructure *message) { on_element (message); };
   job.judge = [this] (const RunResult &run) { return judge (run); };

@@ -113,6 +113,8 @@ struct Job {
   bool ends_by_signal = false;
   /** A person moves in the frames: they are not counted, and end at once. */
   bool is_moved_in = false;
+  /** Shows "100 coded frames in 0:04" as they come. */
+  bool has_progress = true;
   /** Prints "100 coded frames of ...; wrote ...". */
   bool has_result = true;
   /** Called with each element message, on the main thread. */

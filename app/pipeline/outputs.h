@@ -3,6 +3,7 @@
  * an output. */
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <memory>
 #include <optional>
@@ -116,8 +117,17 @@ public:
   /** After finish (): "coded.mkv and fast.mkv (100 frames)", the outputs that
    * are there; with their frames if they are not @p usual. Empty: none. */
   std::string summary (std::optional<guint64> usual) const;
-  /** After finish (): the frames of the first output that is there. */
-  guint64 frames () const { return kept_.empty () ? 0 : kept_[0]->frames (); }
+  /** The output that was added last has pictures, unless another one has. */
+  void last_has_pictures ()
+  {
+    if (!pictures_)
+      pictures_ = outputs_.back ().get ();
+  }
+  /** After finish (): the pictures that are there. */
+  guint64 pictures () const
+  {
+    return std::ranges::count (kept_, pictures_) > 0 ? pictures_->frames () : 0;
+  }
   /** After finish (): the names of the outputs that are there. */
   std::vector<std::string> names () const;
 
@@ -126,6 +136,7 @@ private:
   std::vector<std::unique_ptr<Output>> outputs_;
   std::vector<std::pair<std::string, int>> pipes_; // -1: nobody reads it yet
   std::vector<const Output *> kept_;
+  const Output *pictures_ = nullptr;
   bool published_ = false;
 };
 

@@ -470,6 +470,8 @@ Run::tick ()
             (flaws.empty () ? ", none lost or corrupted" : flaws),
         !flaws.empty ());
   }
+  if (!job_.has_progress)
+    return;
   const double done = counter_->done (job_.total.value_or (0));
   std::string text =
       coded_frames (guint64 (frames)) + " in " + minutes (seconds);

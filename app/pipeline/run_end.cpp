@@ -166,7 +166,7 @@ Run::print_json (Exit exit, const std::string &flaws) const
   nlohmann::ordered_json json = {{"command", job_.command},
       {"source", job_.source}, {"frames", frames ()}, {"not_coded", not_coded_},
       {"lost", lost_}, {"missing", missing_},
-      {"pictures", job_.outputs.frames ()},
+      {"pictures", job_.outputs.pictures ()},
       {"flaws", flaws.empty () ? "" : flaws.substr (2)}, {"outputs", outputs},
       {"damaged", damaged_}, {"interrupted", interrupted_},
       {"status", int (exit)}};

@@ -155,14 +155,20 @@ write_video (
     usage_error ("--output " + name + ": end in " + kVideoForms);
   switch (*form) {
   case VideoForm::mkv:
-    return write_mkv (job, chain, name, style);
+    write_mkv (job, chain, name, style);
+    break;
   case VideoForm::mp4:
-    return write_mp4 (job, chain, name, style);
+    write_mp4 (job, chain, name, style);
+    break;
   case VideoForm::stack:
-    return write_stack (job, chain, name, style);
+    write_stack (job, chain, name, style);
+    break;
   case VideoForm::pictures:
-    return write_pictures (job, chain, name, style);
+    write_pictures (job, chain, name, style);
+    break;
   }
+  if (!style.is_coded)
+    job.outputs.last_has_pictures ();
 }
 
 void

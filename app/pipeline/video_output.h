@@ -19,6 +19,7 @@ struct VideoStyle {
   std::optional<int> bits;    ///< significant bits; none: those of the frames
   std::optional<int> threads; ///< of the encoder; none: one a processor
   bool encoded = false;       ///< they come as .mkv has them
+  bool is_coded = false;      ///< they are the coded frames themselves
   /** Coded frames whose pictures these are pass its sink pad. */
   GstElement *coded = nullptr;
 };

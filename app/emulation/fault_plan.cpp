@@ -93,7 +93,7 @@ fault_text (Fault::Kind kind)
 Result<void>
 FaultPlan::add (std::string_view text, std::uint64_t now)
 {
-  auto faults = faults_;
+  std::map<std::uint64_t, Fault> faults;
   for (const std::string_view piece : split (text, ' ')) {
     if (piece.empty ())
       continue;
@@ -101,8 +101,12 @@ FaultPlan::add (std::string_view text, std::uint64_t now)
     if (!word)
       return word.error ();
     for (int k = 0; k < word->frames; k++)
-      faults[word->first + std::uint64_t (k)] = word->fault;
+      if (!faults.emplace (word->first + std::uint64_t (k), word->fault).second)
+        return Error{"fault " + in_quotes (piece) +
+                     " befalls a frame that already has one; choose other "
+                     "frames, or leave one of them out"};
   }
+  faults.merge (faults_);
   faults_ = std::move (faults);
   return {};
 }

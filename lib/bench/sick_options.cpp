@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 #include <random>
+#include <set>
 #include <type_traits>
 
 #include "base/pixels.h"
@@ -347,9 +348,17 @@ Result<void>
 inflict (SickBenchOptions &bench, std::string_view words)
 {
   SickBenchOptions changed = bench;
-  for (const std::string_view piece : split (words, ' '))
-    if (!piece.empty ())
-      RETURN_IF_ERROR (apply (changed, piece));
+  std::set<std::string_view> names;
+  for (const std::string_view piece : split (words, ' ')) {
+    if (piece.empty ())
+      continue;
+    const std::string_view name = piece.substr (0, piece.find ('='));
+    if (!names.insert (name).second)
+      return Error{"fault " + in_quotes (name) +
+                   " is there twice; leave one of them "
+                   "out"};
+    RETURN_IF_ERROR (apply (changed, piece));
+  }
   bench = std::move (changed);
   return {};
 }

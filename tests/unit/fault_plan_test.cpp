@@ -35,11 +35,21 @@ TEST (FaultPlan, NowIsTheNextFrame)
   EXPECT_EQ (plan.at (79).kind, Kind::none);
 }
 
+TEST (FaultPlan, TheLastOneOfAFrameCounts)
+{
+  FaultPlan plan;
+  ASSERT_TRUE (plan.add ("lose@5:2").ok ());
+  ASSERT_TRUE (plan.add ("duplicate@5").ok ());
+  EXPECT_EQ (plan.at (5).kind, Kind::duplicate);
+  EXPECT_EQ (plan.at (6).kind, Kind::lose);
+}
+
 TEST (FaultPlan, AnErrorNamesTheWordAndAddsNothing)
 {
   for (const char *bad : {"lose", "lose@", "lose@x", "lose@-1", "lose@1:0",
            "lose@1:x", "delay@1", "delay@1:5", "duplicate@1:2", "stop@1:2",
-           "explode@1", "@1", "lose@1:2:3", "lose@99999999999999999999"}) {
+           "explode@1", "@1", "lose@1:2:3", "lose@99999999999999999999",
+           "duplicate@5", "lose@4:2"}) {
     SCOPED_TRACE (bad);
     FaultPlan plan;
     const auto added = plan.add ("lose@5 " + std::string (bad));

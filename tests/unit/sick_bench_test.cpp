@@ -130,7 +130,7 @@ TEST (SickBench, APictureDoesNotDependOnWhereItsMasksAreInMemory)
 TEST (SickBench, TheExposureIsWhereTheTruthHasIt)
 {
   for (const char *words : {"delay=100us", "exposure-late=3ms",
-           "exposure-short=6ms", "trigger-edge=20ms leak=0"}) {
+           "exposure-short=6ms", "trigger-edge=20ms"}) {
     const auto rig = rig_with (std::string ("leak=0 ") + words);
     const BenchProfile &truth = rig->truth ().profile;
     const double begin = truth.trigger_delay->value;
@@ -391,6 +391,9 @@ TEST (SickBench, WordsAreCheckedAndAllOrNothing)
   EXPECT_EQ (message ("flicker=100"),
       "fault 'flicker=100' is not flicker=HZ:DEPTH within its limits; write "
       "for example flicker=100:0.1");
+  EXPECT_EQ (message ("leak=0.1 blur=1 leak=0.2"),
+      "fault 'leak' is there twice; leave one of them out");
+  EXPECT_EQ (options.leak, SickBenchOptions{}.leak);
   EXPECT_NE (message ("leak=1.5"), "");
   EXPECT_NE (message ("hot-pixels=1.5"), "");
   EXPECT_NE (message ("no-trigger=1"), "");

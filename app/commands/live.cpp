@@ -52,7 +52,9 @@ Live::text ()
           "Without another scene or a camera, the simulated bench looks at a "
           "liquid that is\npoured again every 1.5 s.\n\n" +
           WindowOptions::keys_of ("live"),
-      .notes = "Exit status: 3 if frames were lost in the file of --record.\n",
+      .notes = "Exit status: 1 if what was to be kept could not be written, or "
+               "--keep-on could\nsee no event; 3 if frames were lost in the "
+               "file of --record.\n",
       .examples =
           "  The simulated bench, whose camera looks at a candle:\n"
           "    codedexposure live --scene candle --frames 100\n"

@@ -121,6 +121,8 @@ Run::watch_window ()
   };
   const auto failed = [this] (const std::string &why) {
     status_.line ("error: " + why);
+    if (!std::exchange (window_failed_, true) && error_.text.empty ())
+      error_ = {"window", why};
   };
   const auto told = [this] (const std::string &text) { status_.line (text); };
   job_.window->begin (

@@ -84,7 +84,8 @@ private:
   bool silent_ = false;    // no frame came for a while, and that was said
   bool uploading_ = false; // masks are sent to the DMD
   bool interrupted_ = false;
-  bool failed_ = false; // the stream ends because of an error
+  bool failed_ = false;        // the stream ends because of an error
+  bool window_failed_ = false; // to do what was asked of it
   struct {
     std::string element, text;
   } error_; // the first

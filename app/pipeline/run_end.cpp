@@ -121,7 +121,7 @@ Run::finish ()
   }
   if (job_.judge)
     result.exit = job_.judge (result);
-  if (!published || (recording_ && recording_->is_removed ()))
+  if (!published || window_failed_ || (recording_ && recording_->is_removed ()))
     result.exit = Exit::failed;
   const std::string wrote = job_.outputs.summary (guint64 (frames ()));
   if (frames () > 0 || !counter_)

@@ -304,10 +304,7 @@ Window::turn_camera (const std::string &key)
       is_key (key, {"Up", "Down"})
           ? change_gain (setup_.camera, steps)
           : change_exposure (setup_.camera, steps, setup_.exposures);
-  if (turned)
-    calls_.told (*turned);
-  else
-    calls_.failed (turned.error ().message);
+  calls_.told (turned ? *turned : "error: " + turned.error ().message);
 }
 
 void

@@ -2,7 +2,9 @@
 #include "outputs.h"
 
 #include <algorithm>
+#include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <set>
 #include <utility>
 
@@ -23,6 +25,32 @@ namespace fs = std::filesystem;
 
 namespace
 {
+
+/* Without its index, which comes after the first second, no program plays it.
+ * A file consists of parts with their length, 4 bytes, and their kind. */
+bool
+is_mp4_without_index (const std::string &path)
+{
+  std::error_code ignored;
+  if (!fs::is_regular_file (path, ignored))
+    return false;
+  std::ifstream file (path, std::ios::binary);
+  const std::uint64_t size = fs::file_size (path, ignored);
+  std::uint64_t at = 0, length = 0;
+  for (unsigned char head[16] = {}; at < size; at += length) {
+    file.seekg (std::streamoff (at));
+    file.read (reinterpret_cast<char *> (head), sizeof head);
+    length = GST_READ_UINT32_BE (head);
+    if (length == 1) // it does not fit
+      length = GST_READ_UINT64_BE (head + 8);
+    if (length < 8 || length > size - at)
+      return true;
+    if (std::memcmp (head + 4, "moov", 4) == 0)
+      return false;
+    file.clear ();
+  }
+  return true;
+}
 
 class File : public Output
 {
@@ -87,7 +115,9 @@ public:
   }
   bool has_content () const override
   {
-    return (!pad_ || frames_ > 0) && !part_.is_empty ();
+    return (!pad_ || frames_ > 0) && !part_.is_empty () &&
+           !(part_.name ().ends_with (".mp4") &&
+               is_mp4_without_index (part_.path ()));
   }
   const std::string &name () const override { return part_.name (); }
   const std::string &part () const override { return part_.path (); }

@@ -206,13 +206,13 @@ follow_tagged_bits (GstEvent *event, int &bits)
 }
 
 std::optional<std::string>
-why_not_coded (GstEvent *event)
+why_not_coded (GstEvent *event, const char *where)
 {
   GstTagList *tags = tags_of (event);
   const auto made = provenance_from_tags (tags);
   if (!made)
     return std::nullopt;
-  return "The frames were decoded before (" +
+  return std::string ("The frames") + where + " were decoded before (" +
          (*made ? made->value ().text () : "in an unknown way") +
          "). Only coded frames can be used here. Use the recording from which "
          "they were decoded.";

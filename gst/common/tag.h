@@ -63,8 +63,9 @@ std::optional<Result<Provenance>> provenance_from_tags (const GstTagList *tags);
 void follow_tagged_bits (GstEvent *event, int &bits);
 
 /** If the tags of @p event say that its frames were decoded before: a message
- * of an element that takes coded frames only. */
-std::optional<std::string> why_not_coded (GstEvent *event);
+ * of an element that takes coded frames only, there @p where: " of pad off". */
+std::optional<std::string> why_not_coded (
+    GstEvent *event, const char *where = "");
 /** What else to do with recordings of the two beams, after "or". */
 constexpr const char kDecodeTwo[] =
     "use \"codedexposure decode FIRST.mkv --fuse QUALITY --second "

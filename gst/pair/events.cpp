@@ -23,14 +23,22 @@ refuse (GstCodedExposurePair *self, const std::string &why)
   return false;
 }
 
+/* In the words of the program and of launch lines. */
+const char *
+frames_of (bool on)
+{
+  return on ? " of the first camera (pad on)"
+            : " of the second camera (pad off)";
+}
+
 /* The frames of a pad are of the other beam. */
 bool
 refuse_beam (GstCodedExposurePair *self, bool on)
 {
-  return refuse (self,
-      std::string ("The frames of pad ") + (on ? "on" : "off") +
-          " are of the beam of the mirrors that are " + (on ? "off" : "on") +
-          ". Link them to pad " + (on ? "off" : "on") + ", or " + kDecodeTwo);
+  return refuse (self, std::string ("The frames") + frames_of (on) +
+                           " are of the beam of the mirrors that are " +
+                           (on ? "off" : "on") + ". Link them to pad " +
+                           (on ? "off" : "on") + ", or " + kDecodeTwo);
 }
 
 bool
@@ -73,7 +81,7 @@ follow (GstCodedExposurePair *self, bool on, GstEvent *event)
     gst_aggregator_update_segment (GST_AGGREGATOR (self), segment_of (event));
     break;
   case GST_EVENT_TAG:
-    if (const auto why = why_not_coded (event))
+    if (const auto why = why_not_coded (event, frames_of (on)))
       return refuse (self, *why);
     if (const auto setup = setup_from_tags (tags_of (event)); setup && *setup) {
       if (setup->value ().off_beam == on)

@@ -68,7 +68,8 @@ TEST_F (Pair, SwappedCamerasAreAnErrorThatSaysSo)
       pair.get (), {.schedule = schedule_of (kPreset), .off_beam = true});
   EXPECT_EQ (run (frames ({0, 1}), frames ({0, 1})), Numbers{});
   EXPECT_EQ (pair.error (),
-      "The frames of pad on are of the beam of the mirrors that are off. Link "
+      "The frames of the first camera (pad on) are of the beam of the mirrors "
+      "that are off. Link "
       "them to pad off, or use \"codedexposure decode FIRST.mkv --fuse "
       "QUALITY --second SECOND.mkv\", whose SECOND.mkv has the beam of the "
       "mirrors that are off.");
@@ -79,7 +80,8 @@ TEST_F (Pair, AFirstCameraAtPadOffIsAnErrorToo)
   push_setup (off.get (), {.schedule = schedule_of (kPreset)});
   EXPECT_EQ (run (frames ({0, 1}), frames ({0, 1})), Numbers{});
   EXPECT_EQ (pair.error (),
-      "The frames of pad off are of the beam of the mirrors that are on. Link "
+      "The frames of the second camera (pad off) are of the beam of the "
+      "mirrors that are on. Link "
       "them to pad on, or use \"codedexposure decode FIRST.mkv --fuse "
       "QUALITY --second SECOND.mkv\", whose SECOND.mkv has the beam of the "
       "mirrors that are off.");

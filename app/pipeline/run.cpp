@@ -34,7 +34,7 @@ end_at_sources (GstElement *element, gpointer)
 Run::Run (Job &job)
     : job_ (job), loop_ (g_main_loop_new (nullptr, FALSE)),
       status_ (job.command, job.options.verbose),
-      damaged_ (job.salvage && job.retry <= 0)
+      damaged_ (job.salvage && !job.retry)
 {
 }
 

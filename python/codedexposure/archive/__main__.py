@@ -208,14 +208,26 @@ def refuse_second(store):
 
 def hosts_of(options):
     """The file that names computers, or None. Raises Problem if it does not."""
-    if options.hosts:
-        engine.read_hosts(options.hosts)
-    return options.hosts and os.path.abspath(options.hosts)
+    if options.hosts is None:
+        return None
+    engine.read_hosts(options.hosts)
+    return os.path.abspath(options.hosts)
+
+
+def check_engine(name, options):
+    """Refuses options of the other engine, which would have no effect."""
+    others = {'parallel': ('tasks', *engine.PASSED), 'slurm': ('hosts',)}[name]
+    for option in others:
+        if getattr(options, option, None) is not None:
+            Parser(prog=NAME).error(f'--{option} has no effect with {name}, which '
+                                    'does the work; leave it out, or set --on')
 
 
 def engine_of(options):
-    settings = {'on': engine.choose(options.on), 'jobs': options.jobs,
-                'tasks': options.tasks, 'hosts': hosts_of(options)}
+    name = engine.choose(options.on)
+    check_engine(name, options)
+    settings = {'on': name, 'jobs': options.jobs, 'tasks': options.tasks,
+                'hosts': hosts_of(options)}
     settings.update((name, getattr(options, name)) for name in engine.PASSED)
     return settings
 
@@ -227,8 +239,9 @@ def pack(options):
 
 
 def resume(store, made, options):
+    check_engine(made.engine['on'], options)
     with store.lock('run'):
-        if options.hosts:
+        if options.hosts is not None:
             made.engine['hosts'] = hosts_of(options)
             write_json(store.plan, made.to_json())
         jobs = store.last_jobs()

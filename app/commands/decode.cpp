@@ -156,8 +156,9 @@ Decode::declare_relations (Options &options)
   options.need ({"--statistics"}, "--output");
   options.exclude ({"--region", "--method"}, "--fuse");
   options.exclude ({"--start", "--duration", "--find-phase"}, "--excerpt");
-  options.exclude ({"--output", "--coded", "--uncertainty", "--method",
-                       "--mapping", "--bench", "--bits", "--fuse", "--region"},
+  options.exclude (
+      {"--output", "--coded", "--uncertainty", "--method", "--mapping",
+          "--bench", "--bits", "--fuse", "--region", "--force"},
       "--find-phase");
   options.exclude (
       {"--coded", "--uncertainty", "--start", "--duration", "--excerpt",
@@ -177,6 +178,13 @@ Decode::check () const
   };
   if (!output_ && !coded_ && !find_phase_)
     usage_error ("set --output OUT");
+  for (const char *name : {"--method", "--fuse", "--region", "--mapping"})
+    if (declared_->has (name) && !output_ && !uncertainty_ && !second_)
+      usage_error (name +
+                   std::string (" is for pictures, and --coded keeps the "
+                                "frames as they are; set --output OUT, "
+                                "or leave ") +
+                   name + " out");
   if (deflate_ && !any (VideoForm::stack))
     usage_error (
         "--deflate compresses .ome.tif, .h5 and .ome.zarr; set such an "

@@ -30,6 +30,7 @@ private:
   void build (Job &job) const;
   void say (Exit exit) const;
 
+  const Options *declared_ = nullptr;
   AddressOptions address_;
   DecodeOptions decode_;
   WindowOptions window_;
@@ -68,6 +69,7 @@ Receive::text ()
 void
 Receive::declare (Options &options)
 {
+  declared_ = &options;
   options.heading ("");
   address_.declare (options, "address of the sender", "its TCP port");
   options.value ("--wait", wait_, "SECONDS", "how long to try to connect [10]",
@@ -94,9 +96,12 @@ Receive::check () const
   if (window_.keep_on && !has_window ())
     usage_error ("--keep-on is for a window, and --coded keeps all frames; set "
                  "--sink as well, or leave it out");
-  if (decode_.method && coded_ && !output_ && !window_.sink)
-    usage_error ("--method is for subframes; set --output OUT, or leave "
-                 "--method out");
+  for (const char *name : {"--method", "--mapping", "--schedule", "--bits"})
+    if (declared_->has (name) && !output_ && !has_window ())
+      usage_error (name +
+                   std::string (" is for subframes; set --output OUT, "
+                                "or leave ") +
+                   name + " out");
 }
 
 void

@@ -77,9 +77,8 @@ namespace
 std::optional<double>
 time_of (std::string_view text)
 {
-  const auto value = parse_real (text);
-  return value && *value >= 0 && text.find ('-') == text.npos ? value
-                                                              : std::nullopt;
+  return text.find ('-') == text.npos ? seconds ().read (std::string (text))
+                                      : std::nullopt;
 }
 
 } // namespace

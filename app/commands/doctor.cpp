@@ -61,7 +61,7 @@ private:
   RunOptions run_;
   std::optional<Text> only_, faults_;
   std::string output_ = "bench";
-  double seconds_ = 60;
+  std::optional<double> seconds_;
   bool yes_ = false, second_ = false;
   SecondCamera beside_;
 
@@ -291,7 +291,7 @@ Doctor::examine ()
   parts_ = (*rig)->parts ();
   Examination examination{**rig, host_facts ()};
   examination.schedule = plan_.schedule;
-  examination.recording = seconds_;
+  examination.recording = seconds_.value_or (60);
   if (asks ())
     check_stop (ask ("Place a plain, bright target before the bench; nothing "
                      "may move. Then press Enter (q: end).") == 'q');
@@ -420,6 +420,11 @@ Doctor::run ()
   if (!checks)
     usage_error ("--only " + checks.error ().message);
   checks_ = *std::move (checks);
+  if (seconds_ && std::ranges::none_of (checks_, [] (const Check &check) {
+        return check.name == "whole";
+      }))
+    usage_error ("--seconds is for the check whole, which --only leaves out; "
+                 "leave one of them out");
   start_gstreamer ();
   plan_ = SourcePlan::make (source_);
   folder_.emplace (output_, run_.force);

@@ -70,7 +70,7 @@ Play::declare (Options &options)
       "what E writes: mp4, mkv, ome.tif, h5, ome.zarr or png [mp4]",
       one_of ({"mp4", "mkv", "ome.tif", "h5", "ome.zarr", "png"}));
   window_.declare (options, false);
-  run_.declare (options);
+  run_.declare (options, false);
 }
 
 Played

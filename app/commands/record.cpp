@@ -85,6 +85,8 @@ public:
     else if (beside_.camera || beside_.bench)
       usage_error ("--second-camera and --second-bench are for two cameras: "
                    "set --both, or --second for a recording of its own");
+    if (threads_ && codec_ == "raw")
+      usage_error ("--threads is for ffv1; leave it or --codec raw out");
     start_gstreamer ();
     Job job ("record", run_);
     job.ends_by_signal = true;

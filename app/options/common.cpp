@@ -33,6 +33,7 @@ RunOptions::declare (Options &options, bool writes)
       "print the pipeline as a line for gst-launch-1.0, and do not run it");
   options.flag (
       "--verbose", verbose, "also print messages and counters of the elements");
+  options.exclude ({"--json"}, "--print");
 }
 
 } // namespace codedexposure::app

@@ -4,6 +4,7 @@
 #include "coded_filter.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <utility>
 
 #include "tag.h"
@@ -138,9 +139,9 @@ CodedFilter::find_schedule (CodedFormat &format)
 }
 
 /* Frames that were cropped, scaled or timed anew no longer show what the tag
- * says. */
+ * says. A container has the frame period in nanoseconds, the tag the rate. */
 bool
-CodedFilter::check_camera (const CodedFormat &format) const
+CodedFilter::check_camera (CodedFormat &format) const
 {
   if (stream_.settings.schedule.read)
     return true;
@@ -160,9 +161,10 @@ CodedFilter::check_camera (const CodedFormat &format) const
                        size_text (*camera.size) +
                        ": they were cropped or scaled." + remedy);
   const FrameRate rate = camera.rate.value_or (format.rate);
-  if (std::int64_t (rate.num) * format.rate.den ==
-      std::int64_t (rate.den) * format.rate.num)
+  if (std::abs (rate.period () - format.rate.period ()) <= 1) {
+    format.rate = rate;
     return true;
+  }
   const auto text = [] (FrameRate of) {
     return std::to_string (of.num) + "/" + std::to_string (of.den);
   };

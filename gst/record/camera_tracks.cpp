@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "camera_tracks.h"
 
+#include <cstdlib>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -21,14 +22,11 @@ namespace
 
 /* The demuxer knows these only since GStreamer 1.26. */
 CapsPtr
-deep_caps_of (Extent size, Nanoseconds duration)
+deep_caps_of (Extent size)
 {
   GstVideoInfo info;
   gst_video_info_set_format (&info, GST_VIDEO_FORMAT_GRAY16_LE,
       guint (size.width), guint (size.height));
-  if (duration > 0)
-    gst_video_guess_framerate (
-        GstClockTime (duration), &info.fps_n, &info.fps_d);
   return CapsPtr (gst_video_info_to_caps (&info));
 }
 
@@ -63,6 +61,26 @@ aligned (GstBuffer *frame)
 }
 
 } // namespace
+
+/* The demuxer takes the nearest of the common rates. */
+GstPadProbeReturn
+CameraTracks::on_caps (GstPad *, GstPadProbeInfo *info, gpointer self) noexcept
+{
+  GstEvent *event = GST_PAD_PROBE_INFO_EVENT (info);
+  if (GST_EVENT_TYPE (event) != GST_EVENT_CAPS)
+    return GST_PAD_PROBE_OK;
+  const Nanoseconds duration = static_cast<CameraTracks *> (self)->duration_;
+  FrameRate rate;
+  gst_video_guess_framerate (GstClockTime (duration), &rate.num, &rate.den);
+  if (std::abs (rate.period () - duration) > 1)
+    rate = FrameRate::of_period (duration).value_or (rate);
+  const CapsPtr caps (gst_caps_copy (caps_of (event)));
+  gst_caps_set_simple (
+      caps.get (), "framerate", GST_TYPE_FRACTION, rate.num, rate.den, nullptr);
+  info->data = gst_event_new_caps (caps.get ());
+  gst_event_unref (event);
+  return GST_PAD_PROBE_OK;
+}
 
 /* Frames that are cut off are dropped; the track says that they are missing. */
 GstPadProbeReturn
@@ -109,7 +127,7 @@ CameraTracks::take_raw (
     return g_strcmp0 (format, "GRAY8") == 0;
   if (how.pixel_bytes != 2 || how.size.width < 1 || how.size.height < 1)
     return false;
-  deep_.caps = deep_caps_of (how.size, how.duration);
+  deep_.caps = deep_caps_of (how.size);
   GstVideoInfo info;
   gst_video_info_from_caps (&info, deep_.caps.get ());
   deep_.frame_bytes = GST_VIDEO_INFO_SIZE (&info);
@@ -222,6 +240,10 @@ CameraTracks::add_frames (GstPad *pad, const FrameReading &how)
   const CapsPtr caps (gst_pad_query_caps (pad, nullptr));
   if (!make_decoder (pad, caps.get (), how))
     return;
+  duration_ = how.duration;
+  if (duration_ > 0)
+    gst_pad_add_probe (
+        pad, GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, on_caps, this, nullptr);
   queue_ = gst_element_factory_make ("queue", nullptr);
   g_object_set (queue_, "max-size-buffers", PartnerInput::kQueued,
       "max-size-bytes", 0u, "max-size-time", kNoLimit, nullptr);

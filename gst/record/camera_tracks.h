@@ -61,6 +61,8 @@ private:
     gsize frame_bytes = 0;
   };
 
+  static GstPadProbeReturn on_caps (
+      GstPad *, GstPadProbeInfo *info, gpointer self) noexcept;
   static GstPadProbeReturn on_deep_frame (
       GstPad *, GstPadProbeInfo *info, gpointer self) noexcept;
   static guint frames_queued (GstElement *, gpointer self) noexcept;
@@ -75,6 +77,7 @@ private:
   ObjectPtr<GstElement> restore_;
   GstElement *queue_ = nullptr, *decoder_ = nullptr;
   Deep deep_;
+  Nanoseconds duration_ = 0; ///< of a frame, by the head; 0: not known
   GstClockTime decoded_ = GST_CLOCK_TIME_NONE; ///< time of the last frame
   SegmentLeft segment_;                        ///< that is read
 };

@@ -3,6 +3,8 @@
 
 #include <array>
 #include <charconv>
+#include <limits>
+#include <utility>
 
 #include "base/text.h"
 
@@ -36,6 +38,42 @@ FrameRate::time_of (std::int64_t index, int part, int parts) const
 {
   const Wide in_parts = Wide (index) * parts + part;
   return Nanoseconds (in_parts * den * kSecond / (Wide (num) * parts));
+}
+
+std::optional<FrameRate>
+FrameRate::of_period (Nanoseconds period)
+{
+  constexpr Nanoseconds kLargest = std::numeric_limits<int>::max ();
+  if (period < 2)
+    return std::nullopt;
+  /* Continued fraction of a number between those of two ends, in seconds: as
+   * long as both have the same terms, they are also those of what is sought. */
+  Wide low_num = kSecond, low_den = period + 1;
+  Wide high_num = kSecond, high_den = period - 1;
+  Wide num = 1, den = 0, num_before = 0, den_before = 1;
+  const auto append = [&] (Wide term) {
+    num_before = std::exchange (num, term * num + num_before);
+    den_before = std::exchange (den, term * den + den_before);
+  };
+  for (;;) {
+    const Wide term = low_num / low_den;
+    if ((term + 1) * high_den < high_num) {
+      append (term + 1);
+      break;
+    }
+    append (term);
+    low_num -= term * low_den;
+    high_num -= term * high_den;
+    if (low_num == 0) { // 1 / 0 is beyond every number
+      append (high_den / high_num + 1);
+      break;
+    }
+    std::swap (low_num, high_den);
+    std::swap (high_num, low_den);
+  }
+  if (num > kLargest || den > kLargest)
+    return std::nullopt;
+  return FrameRate{int (num), int (den)};
 }
 
 Result<SlotPlan>

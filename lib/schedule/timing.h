@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -27,6 +28,9 @@ struct FrameRate {
   Nanoseconds time_of (std::int64_t index, int part = 0, int parts = 1) const;
   /** One frame period, rounded down. */
   Nanoseconds period () const { return time_of (1); }
+  /** The fraction with the smallest numbers whose period is @p period, to less
+   * than 1 ns; none if they are too large. */
+  static std::optional<FrameRate> of_period (Nanoseconds period);
   bool operator== (const FrameRate &) const = default;
 };
 

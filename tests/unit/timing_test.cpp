@@ -2,6 +2,8 @@
 /* Frame times, slots in a frame period, and the text of times. */
 #include "schedule/timing.h"
 
+#include <cstdlib>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -37,6 +39,24 @@ expect_words (const std::string &message, const std::vector<std::string> &words)
 }
 
 } // namespace
+
+TEST (FrameRate, FollowsFromAPeriodInNanoseconds)
+{
+  for (const FrameRate rate : {FrameRate{25, 1}, {249, 10}, {2499, 100},
+           {30000, 1001}, {24000, 1001}, {1000, 33}, {1, 3600}, {10000, 1}})
+    EXPECT_EQ (FrameRate::of_period (rate.period ()), rate) << rate.num;
+  std::mt19937 random (1);
+  std::uniform_int_distribution<Nanoseconds> any (2, 2'000'000'000);
+  for (int i = 0; i < 10'000; i++) {
+    const Nanoseconds period = any (random);
+    const auto rate = FrameRate::of_period (period);
+    ASSERT_TRUE (rate) << period;
+    EXPECT_LE (std::abs (rate->period () - period), 1) << period;
+  }
+  for (const Nanoseconds period : {0, 1, -5})
+    EXPECT_FALSE (FrameRate::of_period (period)) << period;
+  EXPECT_FALSE (FrameRate::of_period (Nanoseconds (1) << 61));
+}
 
 TEST (FrameRate, KnownTimes)
 {

@@ -274,7 +274,9 @@ constexpr Rule kRules[] = {
     told (
         "frame-jitter", "stop other programs that use the network or the disk"),
     {"slots-differ", "largest difference of a slot", "", within (0.02),
-        within (0.1), "", "check that nothing moves or flickers"},
+        within (0.1), "",
+        "check that nothing moves or flickers; where a slot has only a few "
+        "DN, use fewer slots, more light or more bits"},
     {"slot-cut", "light that a slot loses", "%", most (10), most (kAny), "",
         "use a schedule with fewer slots, give it a readout time, or set "
         "TriggerDelay of the camera to 0"},

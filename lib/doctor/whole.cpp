@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <string>
 
 #include "base/statistics.h"
@@ -159,6 +160,7 @@ private:
   Result<Eigen::MatrixXd> solve () const;
   bool find_shares (Position pixel, Eigen::VectorXd &shares) const;
   std::vector<double> exposed_parts () const;
+  double rounding_of (double part) const;
   void judge (const Eigen::MatrixXd &light, Finding &finding) const;
 
   Examination &examination_;
@@ -282,6 +284,27 @@ Slots::exposed_parts () const
   return exposed;
 }
 
+/** Error of the light of a slot, and of those with which it is compared, as a
+ * part of it: pixels with little noise are all rounded alike. @p part: its
+ * light, as a part of that without a code. */
+double
+Slots::rounding_of (double part) const
+{
+  constexpr int kTerms = 20; // of the Fourier series of the error
+  const double light =
+      part * (mean_of (white_.view ()) - mean_of (dark_.view ())); // DN
+  const auto &gain = examination_.profile.conversion_gain;
+  const double noise = value_or (examination_.profile.read_noise, 0.0);
+  const double variance =
+      gain ? light / gain->value + std::pow (noise / gain->value, 2) : 0.0;
+  double squares = 0.0;
+  for (int k = 1; k <= kTerms; k++) {
+    const double turn = std::numbers::pi * k;
+    squares += std::exp (-4.0 * turn * turn * variance) / (2.0 * turn * turn);
+  }
+  return std::sqrt (2.0 * squares) / light;
+}
+
 void
 Slots::judge (const Eigen::MatrixXd &light, Finding &finding) const
 {
@@ -290,7 +313,8 @@ Slots::judge (const Eigen::MatrixXd &light, Finding &finding) const
   for (const double part : exposed)
     sum += part;
   const double unit = light.sum () / kParts / sum; // of a whole slot
-  Measured worst;                                  // of the differences
+  const double error = std::hypot (kSlotError, rounding_of (unit));
+  Measured worst; // of the differences
   std::size_t differs = 0, cut = 0;
   Plot plot{"Light of the slots", "slot", "part of a whole slot"};
   for (std::size_t slot = 0; slot < exposed.size (); slot++) {
@@ -299,7 +323,7 @@ Slots::judge (const Eigen::MatrixXd &light, Finding &finding) const
     plot.points.push_back ({double (slot), seen.value / unit});
     plot.model.push_back ({double (slot), exposed[slot]});
     const Measured off = {seen.value / unit - exposed[slot],
-        std::hypot (kSlotError, seen.sigma / unit / std::sqrt (kParts))};
+        std::hypot (error, seen.sigma / unit / std::sqrt (kParts))};
     if (std::abs (off.value) > std::abs (worst.value)) {
       worst = off;
       differs = slot;

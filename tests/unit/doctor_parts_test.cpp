@@ -2,9 +2,12 @@
 /* The checks of the parts and of a recording, and the order of all checks. */
 #include "checked_bench.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <nlohmann/json.hpp>
+
+#include "base/pixels.h"
 
 namespace
 {
@@ -138,6 +141,23 @@ TEST (WholeCheck, FindsASlotWithOtherLight)
   }
 }
 
+/* Of 8 bits, such a slot has less than 1 DN, and pixels are all rounded alike.
+ */
+TEST (WholeCheck, DoesNotKnowSlotsThatRoundingHides)
+{
+  SickBenchOptions options = healthy_bench (1);
+  options.black_level *= 255.0 / largest_pixel (options.bits);
+  options.bits = 8;
+  options.full_well = 30'000;
+  options.read_noise = 3;
+  options.switching = 0;
+  const Finding finding = recorded (options, "sequential:16x16");
+  const auto slots =
+      std::ranges::find (finding.diagnoses, "slots-differ", &Diagnosis::id);
+  ASSERT_NE (slots, finding.diagnoses.end ());
+  EXPECT_EQ (slots->severity, Verdict::unknown) << slots->cause;
+}
+
 TEST (WholeCheck, NamesASlotThatTheExposureCuts)
 {
   SickBenchOptions options = healthy_bench (1);
@@ -197,8 +217,8 @@ TEST (Checks, WhatANamedCheckNeedsIsDoneBefore)
 {
   using Names = std::vector<std::string>;
   EXPECT_EQ (names_of (*choose_checks ("", true)), names_of (all_checks ()));
-  EXPECT_EQ (
-      names_of (*choose_checks ("trigger", false)), (Names{"parts", "trigger"}));
+  EXPECT_EQ (names_of (*choose_checks ("trigger", false)),
+      (Names{"parts", "trigger"}));
   EXPECT_EQ (names_of (*choose_checks ("whole,light", true)),
       (Names{"parts", "trigger", "light", "whole"}));
   EXPECT_FALSE (choose_checks ("trigger,soul", true));

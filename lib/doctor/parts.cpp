@@ -216,7 +216,7 @@ check_host (const RigParts &parts, const HostFacts &host, Finding &finding)
 }
 
 /** Frames that are missing between those that came: their stamps are whole
- * periods apart, some of them one. */
+ * periods apart, some of them one, but where the masks begin anew. */
 int
 missing_frames (const std::vector<SeenFrame> &seen, double period)
 {
@@ -226,7 +226,7 @@ missing_frames (const std::vector<SeenFrame> &seen, double period)
     const double steps = double (seen[k].time - seen[k - 1].time) / period;
     const double whole = std::max (1.0, std::round (steps));
     if (std::abs (steps - whole) > kNear)
-      return 0;
+      continue;
     missing += int (whole) - 1;
     steps_of_one += whole == 1.0;
   }

@@ -443,6 +443,13 @@ SecondRun::run ()
   RETURN_IF_ERROR (measure_light ());
   RETURN_IF_ERROR (compare_exposures ());
   RETURN_IF_ERROR (look_at_optics ());
+  /* No recording of this camera follows, in which a few would be seen. */
+  const Reading *missing = finding_.reading ("second camera: missing frames");
+  if (missing && missing->number.value > 0.0)
+    finding_.blame ("lose",
+        "second camera: " + fixed (missing->number.value, 0) + " " +
+            missing->unit + " frames did not come",
+        Verdict::warn);
   finding_.sort ();
   BenchProfile &profile = other_.profile;
   profile.trigger_delay = examination_.profile.trigger_delay;

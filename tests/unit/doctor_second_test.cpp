@@ -3,6 +3,8 @@
  */
 #include "checked_bench.h"
 
+#include <algorithm>
+
 namespace
 {
 
@@ -116,6 +118,7 @@ TEST (SecondCheck, NamesWhatIsWrong)
       {"shift=0/-60", "second-shift"},
       {"auto-gain", "auto-gain"},
       {"packet-loss=0.02", "packet-loss"},
+      {"lose=0.3", "lose"},
   };
   int seed = 2000;
   for (const auto &[fault, name] : faults) {
@@ -135,6 +138,22 @@ TEST (SecondCheck, ALongerWayOfItsFramesIsSaid)
       bench_of_two (5, "second:frame-jitter=20ms"), check_second_alone);
   EXPECT_EQ (e.finding.verdict (), Verdict::warn);
   EXPECT_EQ (e.first_diagnosis (), "second-arrival");
+}
+
+TEST (SecondCheck, AFewFramesThatAreMissingAreSaid)
+{
+  int seen = 0;
+  for (int seed = 1; seed <= 4; seed++) {
+    const CheckedBench e = check_bench (
+        bench_of_two (seed, "second:lose=0.06"), check_second_alone);
+    const Reading *missing =
+        e.finding.reading ("second camera: missing frames");
+    ASSERT_TRUE (missing);
+    seen += missing->number.value > 0.0;
+    EXPECT_EQ (std::ranges::count (e.finding.diagnoses, "lose", &Diagnosis::id),
+        missing->number.value > 0.0 ? 1 : 0);
+  }
+  EXPECT_GT (seen, 0);
 }
 
 TEST (SecondCheck, ItsPoseIsNoFault)

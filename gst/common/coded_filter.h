@@ -113,6 +113,7 @@ struct Picture {
   /** When its light was collected. */
   GstClockTime exposure_start, exposure_duration;
   bool of_region = false; ///< its coordinates are not those of the coded frame
+  bool has_all_bits = false; ///< of its format, whatever the coded frame has
 };
 
 /** A frame of either depth, whose memory is used again. */

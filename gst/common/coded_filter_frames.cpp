@@ -498,7 +498,9 @@ CodedFilter::describe (GstBuffer *outbuf, GstBuffer *coded, FrameMeta meta,
     copy_metas (coded, format ().info, outbuf, picture.info);
 
   meta.subframe = picture.index;
-  meta.bits = significant_bits_of (significant_bits (), picture.info);
+  meta.bits = picture.has_all_bits
+                  ? 0
+                  : significant_bits_of (significant_bits (), picture.info);
   meta.exposure_start = picture.exposure_start;
   meta.exposure_duration = picture.exposure_duration;
   meta.hash.reset ();

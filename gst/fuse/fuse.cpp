@@ -310,8 +310,12 @@ Fuse::push_one (Pictures &pictures, const CodedFrame &coded, int k)
     return GST_FLOW_OK;
   BufferPtr &outbuf = pictures.buffers[std::size_t (k)];
   describe (outbuf.get (), coded.buffer.get (), coded.meta,
-      {pictures.info, k, pts, coded.pts () + GstClockTime (slots.start (k)),
-          GstClockTime (slots.active ())});
+      {.info = pictures.info,
+          .index = k,
+          .pts = pts,
+          .exposure_start = coded.pts () + GstClockTime (slots.start (k)),
+          .exposure_duration = GstClockTime (slots.active ()),
+          .has_all_bits = pictures.pad->state.kind == PadKind::uncertainty});
   const GstFlowReturn flow =
       pictures.pad->state.kind == PadKind::all
           ? push (pictures.pad, std::move (outbuf), duration)

@@ -2,6 +2,7 @@
 /* codedexposure-fuse: the pad of the uncertainty. */
 #include "fuse_harness.h"
 
+#include "common/meta.h"
 #include "common/tag.h"
 
 namespace
@@ -62,6 +63,25 @@ TEST_F (Fuse, UncertaintyHasSixteenBitsAndTheTimesOfTheFrames)
   ASSERT_TRUE (gst_video_info_from_caps (&info, caps.get ()));
   EXPECT_EQ (GST_VIDEO_INFO_FORMAT (&info), GST_VIDEO_FORMAT_GRAY16_LE);
   EXPECT_EQ (info.fps_n, 100);
+}
+
+/* Values of up to 65535, also where the camera has 12 bits. */
+TEST_F (Fuse, UncertaintyHasSixteenSignificantBits)
+{
+  fuse = std::make_unique<ElementHarness> (
+      "codedexposure-fuse schedule=sequential:lattice:4/2");
+  GstHarness *pad = fuse->request ("uncertainty");
+  fuse->set_caps (gray_caps (kWidth, kHeight, "25/1", "GRAY16_LE"));
+  BufferPtr frame = frame_of (draw<std::uint16_t> (kWidth, kHeight,
+                                  [] (int x, int y) { return 40 * (x + y); }),
+      0);
+  set_frame_meta (frame.get (), {.bits = 12});
+  ASSERT_EQ (fuse->push (std::move (frame)), GST_FLOW_OK);
+  for (const BufferPtr &buffer : pull_all ())
+    EXPECT_EQ (get_frame_meta (buffer.get ())->bits, 12);
+  const BufferPtr uncertain (gst_harness_try_pull (pad));
+  ASSERT_TRUE (uncertain);
+  EXPECT_EQ (get_frame_meta (uncertain.get ())->bits, 0);
 }
 
 TEST_F (Fuse, UncertaintyDoesNotChangeTheFrames)

@@ -5,9 +5,11 @@
 #include <cerrno>
 #include <filesystem>
 #include <fstream>
+#include <iomanip>
 #include <limits>
 #include <optional>
 #include <regex>
+#include <sstream>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -43,6 +45,29 @@ rate_at (GstPad *pad)
           gst_caps_get_structure (caps.get (), 0), "framerate", &num, &den))
     return 0;
   return double (num) / den;
+}
+
+/* A name as a field of the table. */
+std::string
+field_of (const std::string &name)
+{
+  if (name.find_first_of (",\"") == name.npos)
+    return name;
+  std::ostringstream field;
+  field << std::quoted (name, '"', '"');
+  return field.str ();
+}
+
+/* The name in the first field of a line of the table. */
+std::string
+first_name (const std::string &line)
+{
+  static const std::regex quoted ("\"((?:[^\"]|\"\")*)\",.*");
+  static const std::regex twice ("\"\"");
+  std::smatch found;
+  return std::regex_match (line, found, quoted)
+             ? std::regex_replace (found.str (1), twice, "\"")
+             : line.substr (0, line.find (','));
 }
 
 /* On the time axis of the recording. */
@@ -222,7 +247,8 @@ Pictures::add (GstPad *pad, GstBuffer *picture)
   const char *synchronised = "unknown";
   if (meta && meta->locked)
     synchronised = *meta->locked ? "true" : "false";
-  line_ = format ("%s,%s,%s,%s,%s,%s,%s,%" G_GUINT64_FORMAT, last_.c_str (),
+  line_ = format ("%s,%s,%s,%s,%s,%s,%s,%" G_GUINT64_FORMAT,
+      field_of (last_).c_str (),
       meta ? std::to_string (meta->frame).c_str () : "",
       meta && meta->subframe >= 0 ? std::to_string (meta->subframe).c_str ()
                                   : "",
@@ -246,7 +272,7 @@ Pictures::remove_earlier () const
   std::ifstream table (names_.path (names_.table ()));
   std::error_code ignored;
   for (std::string line; std::getline (table, line);) {
-    const std::string file = line.substr (0, line.find (','));
+    const std::string file = first_name (line);
     if (names_.include (file))
       fs::remove (names_.path (file), ignored);
   }

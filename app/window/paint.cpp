@@ -42,6 +42,16 @@ strip (int width, int height)
       cairo_image_surface_create (CAIRO_FORMAT_RGB24, width, height));
 }
 
+/* Letters of a reduced text are reduced with it. */
+void
+scale_letters (cairo_t *cairo)
+{
+  cairo_font_options_t *options = cairo_font_options_create ();
+  cairo_font_options_set_hint_metrics (options, CAIRO_HINT_METRICS_OFF);
+  cairo_set_font_options (cairo, options);
+  cairo_font_options_destroy (options);
+}
+
 /* A context of @p surface, which it fills with the ground. */
 Cairo
 begin (cairo_surface_t *surface)
@@ -52,6 +62,7 @@ begin (cairo_surface_t *surface)
   cairo_select_font_face (
       cairo.get (), "sans", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
   cairo_set_font_size (cairo.get (), kFont);
+  scale_letters (cairo.get ());
   return cairo;
 }
 
@@ -64,6 +75,21 @@ write (cairo_t *cairo, double x, double y, const std::string &text,
   cairo_show_text (cairo, text.c_str ());
 }
 
+/* With narrower letters if @text is wider than @room. */
+void
+write_in (cairo_t *cairo, double room, double x, double y,
+    const std::string &text, const Colour &colour)
+{
+  cairo_text_extents_t size;
+  cairo_text_extents (cairo, text.c_str (), &size);
+  cairo_save (cairo);
+  cairo_translate (cairo, x, y);
+  cairo_scale (
+      cairo, std::min (1.0, room / std::max (room, size.x_advance)), 1);
+  write (cairo, 0, 0, text, colour);
+  cairo_restore (cairo);
+}
+
 /* On a logarithmic scale, so that few saturated pixels are seen, too; they are
  * the last bar. */
 void
@@ -71,6 +97,7 @@ draw_histogram (cairo_t *cairo, double left, const Exposure &exposure)
 {
   constexpr double kTop = 26, kHeight = 54;
   const auto &bins = exposure.histogram;
+  const double wide = 2.0 * double (bins.size ());
   const auto most = *std::max_element (bins.begin (), bins.end ());
   const auto height = [most] (double count) {
     return kHeight * std::log1p (count) / std::log1p (double (most));
@@ -79,9 +106,9 @@ draw_histogram (cairo_t *cairo, double left, const Exposure &exposure)
   char text[64];
   std::snprintf (text, sizeof text, "exposure: %.*f %% of pixels saturated",
       clipped && exposure.saturated < 0.001 ? 3 : 1, 100 * exposure.saturated);
-  write (cairo, left, 18, text, clipped ? kAlarm : kText);
+  write_in (cairo, wide, left, 18, text, clipped ? kAlarm : kText);
   use (cairo, {0.05, 0.05, 0.05});
-  cairo_rectangle (cairo, left, kTop, 2.0 * double (bins.size ()), kHeight);
+  cairo_rectangle (cairo, left, kTop, wide, kHeight);
   cairo_fill (cairo);
   for (std::size_t k = 0; k < bins.size (); k++) {
     use (cairo, clipped && k + 1 == bins.size () ? kAlarm : kFaint);
@@ -120,16 +147,19 @@ paint_panel (const WindowLayout &layout, const std::vector<PanelLine> &lines,
   const int width = layout.size ().width;
   Surface surface = strip (width, WindowLayout::kPanel);
   const Cairo cairo = begin (surface.get ());
+  const double room = width - 2 * kMargin;
+  double right = width;
+  if (exposure && !exposure->histogram.empty ()) {
+    right -= kMargin + 2.0 * double (exposure->histogram.size ());
+    draw_histogram (cairo.get (), right, *exposure);
+  }
   for (int k = 0; k < int (lines.size ()); k++) {
     const PanelLine &line = lines[std::size_t (k)];
-    write (cairo.get (), kMargin, 18 + k * kLine, line.text,
-        line.alarm ? kAlarm : kText);
+    write_in (cairo.get (), right - 2 * kMargin, kMargin, 18 + k * kLine,
+        line.text, line.alarm ? kAlarm : kText);
   }
-  if (exposure && !exposure->histogram.empty ())
-    draw_histogram (cairo.get (),
-        width - kMargin - 2.0 * double (exposure->histogram.size ()),
-        *exposure);
-  write (cairo.get (), kMargin, WindowLayout::kPanel - 9, keys, kFaint);
+  write_in (
+      cairo.get (), room, kMargin, WindowLayout::kPanel - 9, keys, kFaint);
   return surface;
 }
 
@@ -157,11 +187,7 @@ paint_sheet (const std::string &text, Extent most)
   cairo_select_font_face (cairo.get (), "monospace", CAIRO_FONT_SLANT_NORMAL,
       CAIRO_FONT_WEIGHT_NORMAL);
   cairo_set_font_size (cairo.get (), 12);
-  /* Letters of a reduced sheet are reduced with it. */
-  cairo_font_options_t *options = cairo_font_options_create ();
-  cairo_font_options_set_hint_metrics (options, CAIRO_HINT_METRICS_OFF);
-  cairo_set_font_options (cairo.get (), options);
-  cairo_font_options_destroy (options);
+  scale_letters (cairo.get ());
   for (std::size_t k = 0; k < rows.size (); k++)
     write (cairo.get (), kMargin, kMargin + kRow * (double (k) + 0.75), rows[k],
         kText);

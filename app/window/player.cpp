@@ -288,6 +288,17 @@ Player::frame_at (Nanoseconds time) const
   return std::clamp (int (later - positions.begin ()) - 1, 0, last ());
 }
 
+Player::Place
+Player::place_at (Nanoseconds time) const
+{
+  const int frame = frame_at (time);
+  const Nanoseconds within =
+      time - played_.positions[std::size_t (frame)] + kInside;
+  return {
+      frame, std::clamp (int (within * played_.slots / played_.rate.period ()),
+                 0, played_.slots - 1)};
+}
+
 /* What the screen shows; pictures that wait for it are drawn before. */
 Player::Place
 Player::place () const
@@ -297,12 +308,13 @@ Player::place () const
     return wanted_;
   if (!gst_element_query_position (pipeline_, GST_FORMAT_TIME, &time))
     return {};
-  const int frame = frame_at (time);
-  const Nanoseconds within =
-      time - played_.positions[std::size_t (frame)] + kInside;
-  return {
-      frame, std::clamp (int (within * played_.slots / played_.rate.period ()),
-                 0, played_.slots - 1)};
+  return place_at (time);
+}
+
+bool
+Player::is_last (Nanoseconds time) const
+{
+  return place_at (time) == Place{last (), played_.slots - 1};
 }
 
 void
@@ -329,7 +341,8 @@ Player::line (Nanoseconds time) const
     return seconds_of (played_.positions[std::size_t (frame)]);
   };
   std::string text =
-      now.is_at_end   ? "at the end"
+      now.is_at_end || (!now.is_paused && !now.loops && is_last (time))
+          ? "at the end"
       : now.is_paused ? "paused"
       : now.speed < 0 ? format ("playing at 1/%d speed", 1 << -now.speed)
       : now.speed > 0 ? format ("playing %d times as fast", 1 << now.speed)

@@ -57,7 +57,7 @@ public:
   static const char *short_keys ();
 
   /** Before @p pipeline plays. Main thread, as all but
-   * is_paused (), is_wanted () and line (). */
+   * is_paused (), is_last (), is_wanted () and line (). */
   void begin (GstElement *pipeline, Failed failed);
   /** Whether the end of the stream, or what else @p message says, is dealt
    * with.
@@ -70,6 +70,8 @@ public:
   /** Draws the picture of a pause once more. */
   void redraw ();
   bool is_paused () const { return state ().is_paused; }
+  /** Whether @p time is the position of the last subframe, which stays. */
+  bool is_last (Nanoseconds time) const;
   /** Whether the subframe at the position @p time, of this slot, is what is
    * looked for: in a pause, others are drawn as well. */
   bool is_wanted (Nanoseconds time, int slot) const;
@@ -94,6 +96,7 @@ private:
   int last () const { return int (played_.positions.size ()) - 1; }
   Nanoseconds end_of (int frame) const;
   int frame_at (Nanoseconds time) const;
+  Place place_at (Nanoseconds time) const;
   Place place () const;
   State state () const;
   template <typename Change>

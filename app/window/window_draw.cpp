@@ -169,8 +169,12 @@ Window::draw_texts (cairo_t *cairo, const Scene &scene, ViewTime time)
   const Shown *coded = scene.shown[kCamera].get ();
   const Shown *subframe = scene.shown[kSubframes].get ();
   const bool other = painted_subframe_ != subframe;
-  const bool paused = setup_.player && setup_.player->is_paused ();
-  if (!panel_ || scene.snapshot || (!scene.live && other) || paused ||
+  /* No picture follows that would be drawn later. */
+  const bool stays =
+      setup_.player && (setup_.player->is_paused () ||
+                           (subframe && setup_.player->is_last (Nanoseconds (
+                                            subframe->stream_time))));
+  if (!panel_ || scene.snapshot || (!scene.live && other) || stays ||
       time < painted_ || time >= painted_ + kPanelPeriod) {
     panel_ = paint_panel (scene.layout, scene.text,
         coded ? coded->exposure.get () : nullptr,

@@ -23,6 +23,8 @@ namespace
 
 /* An element message by which any element says that something happened. */
 constexpr const char *kKeep = "codedexposure-keep";
+/* A message of the window itself. */
+constexpr const char *kResized = "codedexposure-resized";
 
 constexpr int kLeft = 1, kRight = 3, kWheelUp = 4, kWheelDown = 5; // buttons
 
@@ -49,13 +51,18 @@ text_of (const EventFound &event)
 } // namespace
 
 /* Keys are for the window; no element of the stream needs them. They go by the
- * bus, on which sinks post those that come while the stream is flushed. */
+ * bus, on which sinks post those that come while the stream is flushed. A sink
+ * that does not scale asks for pictures of another size. */
 void
 Window::watch_keys (GstElement *overlay)
 {
   add_probe (pad_of (overlay, "src").get (), GST_PAD_PROBE_TYPE_EVENT_UPSTREAM,
       [overlay] (GstPad *, GstPadProbeInfo *info) {
         GstEvent *event = gst_pad_probe_info_get_event (info);
+        if (GST_EVENT_TYPE (event) == GST_EVENT_RECONFIGURE)
+          gst_element_post_message (
+              overlay, gst_message_new_element (GST_OBJECT (overlay),
+                           gst_structure_new_empty (kResized)));
         if (GST_EVENT_TYPE (event) != GST_EVENT_NAVIGATION)
           return GST_PAD_PROBE_OK;
         gst_element_post_message (overlay,
@@ -100,6 +107,11 @@ Window::take (GstMessage *message)
   GstEvent *parsed = nullptr;
   if (setup_.keeper && take_kept (message))
     return true;
+  if (gst_message_has_name (message, kResized)) {
+    if (setup_.player)
+      setup_.player->redraw ();
+    return true;
+  }
   if (gst_navigation_message_get_type (message) !=
           GST_NAVIGATION_MESSAGE_EVENT ||
       !gst_navigation_message_parse_event (message, &parsed))

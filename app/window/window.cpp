@@ -119,6 +119,10 @@ Window::finish ()
   for (auto message = next (); setup_.keeper && message; message = next ())
     take_kept (message.get ());
   snapshots_.write ();
+  /* No picture is drawn any more. */
+  if (snapshot_wanted_)
+    calls_.failed ("no snapshot was written: the window closed before its next "
+                   "picture; press S, and Q when the file is named");
   if (setup_.player)
     setup_.player->finish ();
 }

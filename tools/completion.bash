@@ -3,22 +3,19 @@
 # files. What there is, its --help says.
 _codedexposure ()
 {
-  local word=${COMP_WORDS[COMP_CWORD]} i help
-  local -a before=()
-  for ((i = 1; i < COMP_CWORD; i++)); do
-    [[ ${COMP_WORDS[i]} == -* ]] && break
-    before+=("${COMP_WORDS[i]}")
+  local word=${COMP_WORDS[COMP_CWORD]} i help commands choices=
+  local -a row=()
+  # Only of commands that a help lists: bench runs other words.
+  for ((i = 1; ; i++)); do
+    help=$("${COMP_WORDS[0]}" "${row[@]}" --help 2> /dev/null < /dev/null) || return 0
+    commands=$(sed -nE 's/^  ([a-z]+)  +[a-z].*/\1/p' <<< "$help")
+    ((i < COMP_CWORD)) && grep -qxF -e "${COMP_WORDS[i]}" <<< "$commands" || break
+    row+=("${COMP_WORDS[i]}")
   done
-  # The longest row of commands; what follows are names of files.
-  while ! help=$("${COMP_WORDS[0]}" "${before[@]}" --help 2> /dev/null < /dev/null); do
-    ((${#before[@]})) || return 0
-    unset 'before[-1]'
-  done
-  local choices
   if [[ $word == -* ]]; then
     choices=$(grep -oE -- '^  -[-a-z]+(, --[a-z-]+)?' <<< "$help" | tr -d ,)
-  elif [[ ${COMP_WORDS[COMP_CWORD - 1]} != -* ]]; then
-    choices=$(sed -nE 's/^  ([a-z]+)  +[a-z].*/\1/p' <<< "$help")
+  elif ((i == COMP_CWORD)); then
+    choices=$commands
   fi
   mapfile -t COMPREPLY < <(compgen -W "$choices" -- "$word")
 }

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <dlfcn.h>
+#include <glib.h>
 #include <unistd.h>
 
 namespace codedexposure::app
@@ -29,6 +31,7 @@ using XWindow = unsigned long;
 using XAtom = unsigned long;
 
 using OnError = int (XDisplay *, void *error);
+using OnLost = void (XDisplay *, void *data);
 
 /* XClientMessageEvent, as large as any XEvent. */
 struct XMessage {
@@ -110,7 +113,56 @@ find_windows (
     x.Free (children);
 }
 
+/* Of the main thread. */
+std::function<void ()> on_lost;
+
+void
+tell_lost (XDisplay *display, void *library)
+{
+  bool ignored = true;
+  /* The library has locked it, so that no other thread uses it until exit. */
+  if (const auto unlock =
+          function_of<void (XDisplay *)> (library, "XUnlockDisplay", ignored))
+    unlock (display);
+  g_idle_add (
+      [] (gpointer) {
+        if (const auto lost = std::exchange (on_lost, nullptr))
+          lost ();
+        return gboolean (G_SOURCE_REMOVE);
+      },
+      nullptr);
+}
+
 } // namespace
+
+/* Stands for that of libX11 wherever this program opens a display, sinks
+ * included: only a display that was just opened can be told not to exit. */
+extern "C" [[gnu::visibility ("default")]] XDisplay *XOpenDisplay (
+    const char *name);
+XDisplay *
+XOpenDisplay (const char *name)
+{
+  static void *library = dlopen ("libX11.so.6", RTLD_LAZY);
+  bool ignored = true;
+  const auto open =
+      function_of<XDisplay *(const char *)> (library, "XOpenDisplay", ignored);
+  const auto on_exit = function_of<void (XDisplay *, OnLost *, void *)> (
+      library, "XSetIOErrorExitHandler", ignored);
+  const auto on_error = function_of<void *(int (XDisplay *))> (
+      library, "XSetIOErrorHandler", ignored);
+  XDisplay *display = open ? open (name) : nullptr;
+  if (display && on_exit && on_error) {
+    on_error ([] (XDisplay *) { return 0; });
+    on_exit (display, tell_lost, library);
+  }
+  return display;
+}
+
+void
+watch_screen (std::function<void ()> lost)
+{
+  on_lost = std::move (lost);
+}
 
 Screen
 find_screen ()

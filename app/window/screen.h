@@ -2,6 +2,7 @@
 /* The X screen that windows open on. */
 #pragma once
 
+#include <functional>
 #include <optional>
 
 #include "base/geometry.h"
@@ -21,6 +22,11 @@ struct Screen {
 };
 
 Screen find_screen ();
+
+/** Calls @p lost in the main loop when the connection to the X server of a
+ * window breaks. By itself, the X library would end the program, and with it a
+ * recording. */
+void watch_screen (std::function<void ()> lost);
 
 /** Asks the desktop to let the X windows of this program fill the screen, or to
  * give them back their size. False: there is no such window. */

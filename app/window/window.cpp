@@ -84,6 +84,7 @@ Window::Window (WindowBranch branch, GstPad *coded, Setup setup)
 
 Window::~Window ()
 {
+  watch_screen (nullptr);
   if (on_signal_ > 0)
     g_source_remove (on_signal_);
 }
@@ -95,6 +96,10 @@ Window::begin (Calls calls)
   calls_ = std::move (calls);
   snapshots_.begin (
       [this] (const auto &files) { calls_.wrote (files, ""); }, calls_.failed);
+  watch_screen ([this] {
+    calls_.failed ("the connection to the screen is lost");
+    calls_.end ();
+  });
   if (setup_.player)
     return setup_.player->begin (calls_.pipeline, calls_.failed);
   on_signal_ = g_unix_signal_add (

@@ -236,6 +236,18 @@ INSTANTIATE_TEST_SUITE_P (Pairs, Faults,
         Case{"lose=0.02 frame-late", " frame-late "},
         Case{"jitter frame-late-varies", " jitter frame-late-varies "}));
 
+/* Noise is many DN there, so that few means are the largest one. */
+TEST (LightCheck, SeesThatPixelsOf16BitsAreSaturated)
+{
+  SickBenchOptions options = bench (7);
+  options.bits = 16;
+  options.black_level = 1024;
+  const Visit seen = visit (options, "bright=1.6");
+  EXPECT_EQ (seen.light.verdict (), Verdict::fail);
+  ASSERT_FALSE (seen.light.diagnoses.empty ());
+  EXPECT_EQ (seen.light.diagnoses[0].id, "bright");
+}
+
 /** Faults that other checks find do not look like one of these. */
 class OtherFaults : public Faults
 {

@@ -152,7 +152,8 @@ MirrorRun::see_black ()
       const Stack seen, look_at_light (examination_, half, 1, kFrames));
   double below = 0.0, variance = 0.0, count = 0.0, light = 1.0;
   each_pixel (seen.mean, [&] (int x, int y) {
-    const double full = double (on_.mean.at (x, y) - off_.mean.at (x, y));
+    const double full =
+        double (on_.mean.at (x, y) - off_.mean.at (x, y)) / exposed_;
     const double more = double (seen.mean.at (x, y) - off_.mean.at (x, y));
     light = std::max (light, full);
     if (defects_.good.at (x, y) == 0 || more > 0.02 * full)
@@ -246,8 +247,8 @@ Result<Finding>
 MirrorRun::run ()
 {
   RETURN_IF_ERROR (see_light ());
-  const auto view =
-      look_where (examination_, off_.mean, on_.mean, defects_.good.view ());
+  const auto view = look_where (
+      examination_, off_.mean, on_.mean, defects_.good.view (), exposed_);
   if (view) {
     view_ = *view;
     const double mirror = view_.pixels_per_mirror ();

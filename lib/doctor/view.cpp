@@ -83,7 +83,7 @@ CoarseView::orientation () const
 
 Result<CoarseView>
 look_where (Examination &examination, const Image<float> &off,
-    const Image<float> &on, ImageView<const std::uint8_t> good)
+    const Image<float> &on, ImageView<const std::uint8_t> good, double part)
 {
   const Extent mirrors = examination.rig.parts ().dmd.shown ();
   Eigen::Matrix<double, 3, 2> planes = Eigen::Matrix<double, 3, 2>::Zero ();
@@ -93,7 +93,7 @@ look_where (Examination &examination, const Image<float> &off,
     ASSIGN_OR_RETURN (
         const Eigen::Vector3d plane, plane_of (seen.mean, off, on, good));
     planes.col (along_x ? 0 : 1) =
-        plane * (along_x ? mirrors.width : mirrors.height);
+        plane * part * (along_x ? mirrors.width : mirrors.height);
   }
   return CoarseView{planes (0, 0), planes (1, 0), planes (2, 0) - 0.5,
       planes (0, 1), planes (1, 1), planes (2, 1) - 0.5};

@@ -34,10 +34,11 @@ struct CoarseView {
  * the bottom: the light of a pixel tells its place.
  *
  * @p off, @p on: means with all mirrors off and on. @p good: pixels that count.
- * Error when too few pixels see mirrors.
+ * @p part: of the exposure in which the mirrors of @p on are on. Error when too
+ * few pixels see mirrors.
  */
 Result<CoarseView> look_where (Examination &examination,
     const Image<float> &off, const Image<float> &on,
-    ImageView<const std::uint8_t> good);
+    ImageView<const std::uint8_t> good, double part = 1.0);
 
 } // namespace codedexposure

@@ -53,6 +53,15 @@ TEST (MirrorsCheck, CountsStuckMirrors)
   }
 }
 
+/* The light of all mirrors is that of a part of the exposure then. */
+TEST (MirrorsCheck, KnowsThePlaceOfMirrorsWhereLightSaturates)
+{
+  const CheckedBench e =
+      check_bench (sick_bench (8, "stuck-off=20 bright=1.2"), check_mirrors);
+  EXPECT_NEAR (e.finding.reading ("mirrors that are stuck off")->number.value,
+      double (e.rig->truth ().stuck_off.size ()), 2.0);
+}
+
 TEST (MirrorsCheck, LeavesOtherFaultsToOtherChecks)
 {
   for (const char *words :

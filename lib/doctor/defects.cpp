@@ -15,8 +15,9 @@ namespace
 
 /* Pixels with less than this part of the bright ones' light see no mirrors. */
 constexpr double kCovered = 0.1;
-/* Part of the light by which a pixel differs that has a defect. */
-constexpr double kDiffers = 0.12;
+/* Part of the light by which a pixel differs that has a defect, and how many
+ * times more than the others, up to half of the light. */
+constexpr double kDiffers = 0.12, kOutlier = 5.0;
 /* A dead pixel has less than this part of the light. */
 constexpr double kDead = 0.1;
 /* Light of a stuck mirror, in mirrors; more is dust. */
@@ -97,6 +98,7 @@ public:
   Defects run ();
 
 private:
+  void find_spread ();
   void find_bright ();
   void find_dim ();
   void add_dim (const Group &group);
@@ -137,6 +139,20 @@ Search::spot_of (const Group &group) const
   spot.centre.x /= spot.light;
   spot.centre.y /= spot.light;
   return spot;
+}
+
+/* The median does not see defects. */
+void
+Search::find_spread ()
+{
+  constexpr double kSigmas = 1.4826; // of a median
+  std::vector<float> values;
+  each_pixel (light_, [&] (int x, int y) {
+    if (covered_.at (x, y) != 0)
+      values.push_back (std::abs (1.0f - light_.at (x, y) / field_.at (x, y)));
+  });
+  if (!values.empty ())
+    found_.spread = kSigmas * double (median (std::move (values)));
 }
 
 void
@@ -241,10 +257,11 @@ void
 Search::find_dim ()
 {
   Image<std::uint8_t> marked (off_.width (), off_.height ());
+  const double differs = std::clamp (kOutlier * found_.spread, kDiffers, 0.5);
   each_pixel (off_, [&] (int x, int y) {
     const bool open = covered_.at (x, y) != 0 && known_.at (x, y) == 0;
     part_.at (x, y) = open ? 1.0f - light_.at (x, y) / field_.at (x, y) : 0.0f;
-    marked.at (x, y) = part_.at (x, y) > float (kDiffers);
+    marked.at (x, y) = part_.at (x, y) > float (differs);
   });
   for (const Group &group : groups_of (marked))
     add_dim (group);
@@ -261,6 +278,7 @@ Search::run ()
       std::max (float (kCovered) * bright_, 0.005f * float (largest_));
   each_pixel (off_,
       [&] (int x, int y) { covered_.at (x, y) = field_.at (x, y) > least; });
+  find_spread ();
   find_bright ();
   find_dim ();
   each_pixel (off_, [&] (int x, int y) {

@@ -24,6 +24,9 @@ struct Defects {
   std::vector<Offset> dead; ///< pixels that do not see light
   std::vector<DefectSpot> stuck_on, stuck_off; ///< mirrors
   std::vector<DefectSpot> dust;                ///< larger than a mirror
+  /** Standard deviation of the light of neighbouring pixels, as a part of it.
+   */
+  double spread = 0.0;
   /** 1: a pixel that sees mirrors, and that has no defect nearby. */
   Image<std::uint8_t> good;
 };
@@ -32,7 +35,8 @@ struct Defects {
  * Compares pictures with all mirrors off and on.
  *
  * A hot pixel is brighter in both; a stuck mirror is seen in one of them, by
- * one pixel or a few. @p off, @p on: means of frames, DN, of the same size.
+ * one pixel or a few, by which the others do not differ. @p off, @p on: means
+ * of frames, DN, of the same size.
  * @p largest: the largest DN. @p mirror: pixels that a mirror covers.
  */
 Defects find_defects (const Image<float> &off, const Image<float> &on,

@@ -170,6 +170,10 @@ constexpr Rule kRules[] = {
     {"nonlinear", "linearity error", "% of the range", most (1), most (2),
         "pixel values differ by up to {} % of the range from a straight line",
         kStraight},
+    {"prnu", "PRNU", "%", most (2), most (10),
+        "the sensitivity of neighbouring pixels differs by {} % (standard "
+        "deviation)",
+        "switch on the flat-field correction of the camera, or replace it"},
     {"black-clipped", "", "%", most (1), most (3),
         "{} % of the dark pixel values are 0, where noise is cut off",
         "raise BlackLevel until no dark pixel is 0"},

@@ -97,6 +97,7 @@ private:
   void report ();
   void diagnose ();
   void diagnose_black ();
+  void diagnose_pixels ();
   void diagnose_defects (
       const char *id, const char *what, const std::vector<Offset> &pixels);
   void plot ();
@@ -438,8 +439,23 @@ PhotonTransferRun::diagnose ()
       finding_.blame (
           "noise", "noise does not grow with light as that of photons does");
   }
+  diagnose_pixels ();
   diagnose_defects ("dead-pixels", "do not see light", defects_.dead);
   diagnose_defects ("hot-pixels", "have a signal without light", defects_.hot);
+}
+
+/* By how much the pixels' sensitivity differs, beyond the noise of means. */
+void
+PhotonTransferRun::diagnose_pixels ()
+{
+  constexpr double kError = 0.02; // relative
+  const StackMeans bright = means_of (bright_, defects_.good.view ());
+  const double noise =
+      (bright.variance / bright_.frames + dark_means_.variance / dark_.frames) /
+      std::pow (std::max (1.0, signal (bright)), 2);
+  const double part =
+      std::sqrt (std::max (0.0, std::pow (defects_.spread, 2) - noise));
+  finding_.measure ("prnu", scaled ({part, kError * part}, 100.0));
 }
 
 void

@@ -64,10 +64,10 @@ TEST (MirrorsCheck, KnowsThePlaceOfMirrorsWhereLightSaturates)
 
 TEST (MirrorsCheck, LeavesOtherFaultsToOtherChecks)
 {
-  for (const char *words :
-      {"blur=3", "dust=6", "hot-pixels=200", "dead-pixels=200",
-          "vignetting=0.6", "bright=1.6", "rotation=4", "scale=1.1",
-          "shift=100/0", "noise=100", "nonlinear=0.05", "jitter=40us"})
+  for (const char *words : {"blur=3", "dust=6", "hot-pixels=200",
+           "dead-pixels=200", "vignetting=0.6", "bright=1.6", "rotation=4",
+           "scale=1.1", "prnu=0.03", "prnu=0.05", "shift=100/0", "noise=100",
+           "nonlinear=0.05", "jitter=40us"})
     EXPECT_EQ (
         check_bench (sick_bench (4, words), check_mirrors).first_diagnosis (),
         "")

@@ -51,8 +51,22 @@ TEST (SensorCheck, NamesWhatIsWrong)
 {
   for (const char *words :
       {"nonlinear=0.05", "nonlinear=-0.03", "noise=100", "black-clipped=2",
-          "hot-pixels=200", "dead-pixels=200", "missing-bits=2"})
+          "hot-pixels=200", "dead-pixels=200", "missing-bits=2", "prnu=0.05"})
     expect_named (words, check_sensor);
+}
+
+TEST (SensorCheck, MeasuresHowTheSensitivityOfPixelsDiffers)
+{
+  for (const double prnu : {0.005, 0.01, 0.03, 0.05, 0.08}) {
+    const CheckedBench e = check_bench (
+        sick_bench (5, "prnu=" + std::to_string (prnu)), check_sensor);
+    const Reading *found = e.finding.reading ("PRNU");
+    ASSERT_TRUE (found);
+    EXPECT_NEAR (found->number.value, 100.0 * prnu, 6.0 * prnu + 0.05) << prnu;
+    EXPECT_EQ (
+        e.finding.verdict (), prnu > 0.02 ? Verdict::warn : Verdict::pass)
+        << prnu;
+  }
 }
 
 TEST (SensorCheck, TakesLightOfAnyKind)

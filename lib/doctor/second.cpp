@@ -433,14 +433,15 @@ SecondRun::look_at_optics ()
 Result<Finding>
 SecondRun::run ()
 {
-  RETURN_IF_ERROR (look_at_parts ());
-  RETURN_IF_ERROR (count_frames ());
-  if (finding_.is_ill ()) {
-    finding_.sort ();
-    return std::move (finding_);
+  /* What follows from a fault is not judged. */
+  for (const auto step : {&SecondRun::look_at_parts, &SecondRun::count_frames,
+           &SecondRun::look_for_late_frames, &SecondRun::measure_light}) {
+    RETURN_IF_ERROR ((this->*step) ());
+    if (finding_.verdict () == Verdict::fail) {
+      finding_.sort ();
+      return std::move (finding_);
+    }
   }
-  RETURN_IF_ERROR (look_for_late_frames ());
-  RETURN_IF_ERROR (measure_light ());
   RETURN_IF_ERROR (compare_exposures ());
   RETURN_IF_ERROR (look_at_optics ());
   /* No recording of this camera follows, in which a few would be seen. */

@@ -132,6 +132,15 @@ TEST (SecondCheck, NamesWhatIsWrong)
   }
 }
 
+/** Its exposure and its mapping are not known then. */
+TEST (SecondCheck, DoesNotJudgeWhatFollowsFromItsLight)
+{
+  const CheckedBench e =
+      check_bench (bench_of_two (4, "second:bright=1.6"), check_second_alone);
+  ASSERT_EQ (e.finding.diagnoses.size (), 1u);
+  EXPECT_EQ (e.first_diagnosis (), "second-bright");
+}
+
 TEST (SecondCheck, ALongerWayOfItsFramesIsSaid)
 {
   const CheckedBench e = check_bench (

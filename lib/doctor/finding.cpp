@@ -102,6 +102,14 @@ Finding::judge (
 }
 
 void
+Finding::judge_bits (int missing, int bits)
+{
+  if (missing > 0)
+    blame ("missing-bits", "the lowest " + std::to_string (missing) + " of " +
+                               std::to_string (bits) + " bits are always 0");
+}
+
+void
 Finding::sort ()
 {
   std::ranges::stable_sort (

@@ -78,6 +78,8 @@ struct Finding {
    * @p cause: of what is wrong, in place of that of the rule. */
   Verdict judge (std::string_view name, const Measured &number,
       const std::string &cause = {});
+  /** Adds a diagnosis where the lowest @p missing of @p bits never are 1. */
+  void judge_bits (int missing, int bits);
   /** add () and judge (). */
   Verdict measure (std::string_view name, const Measured &number,
       const std::string &cause = {})

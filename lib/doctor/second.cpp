@@ -2,6 +2,7 @@
 /* Check "second": a camera in the beam of the mirrors that are off, against the
  * first one: the same exposures, its light, and where it looks. */
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numbers>
 #include <numeric>
@@ -9,6 +10,7 @@
 
 #include "base/statistics.h"
 #include "base/try.h"
+#include "doctor/picture.h"
 #include "doctor/stack.h"
 
 namespace codedexposure
@@ -83,6 +85,7 @@ private:
   Measured lacking (std::span<const Slot> slots) const;
   Result<void> compare_exposures ();
   Result<void> measure_light ();
+  Result<void> look_at_pixels ();
   Result<void> look_at_optics ();
   void compare_views (const Mapping &of_second);
   void take_over (Finding finding);
@@ -420,6 +423,30 @@ SecondRun::compare_views (const Mapping &of_second)
   finding_.measure ("second-shift", {100 * both / std::max (1.0, first), 0.0});
 }
 
+/* What the camera does not say of them. */
+Result<void>
+SecondRun::look_at_pixels ()
+{
+  constexpr int kPictures = 12;
+  ASSIGN_OR_RETURN (
+      const Stack dark, look_at_light (other_, no_light (), 1, kPictures));
+  StackSum sum (second_.parts ().largest ());
+  PictureCheck pictures (kPictures);
+  RETURN_IF_ERROR (look_for_whole_frames (
+      other_, lit (0, 1), 1, kPictures, [&] (const SeenFrame &frame) {
+        sum.add (frame);
+        pictures.add (frame);
+      }));
+  ASSIGN_OR_RETURN (const Stack all, std::move (sum).stack (&dark.mean));
+  Finding finding;
+  pictures.judge (all, dark.mean, second_.parts ().largest (), finding);
+  finding.judge_bits (
+      std::countr_zero (unsigned (dark.bits_seen | all.bits_seen)),
+      second_.parts ().bits);
+  take_over (std::move (finding));
+  return {};
+}
+
 Result<void>
 SecondRun::look_at_optics ()
 {
@@ -433,9 +460,13 @@ SecondRun::look_at_optics ()
 Result<Finding>
 SecondRun::run ()
 {
+  finding_.notes.emplace_back ("not checked of the second camera",
+      "conversion gain, full well, read noise, linearity and defects, as its "
+      "light cannot be dosed");
   /* What follows from a fault is not judged. */
   for (const auto step : {&SecondRun::look_at_parts, &SecondRun::count_frames,
-           &SecondRun::look_for_late_frames, &SecondRun::measure_light}) {
+           &SecondRun::look_for_late_frames, &SecondRun::measure_light,
+           &SecondRun::look_at_pixels}) {
     RETURN_IF_ERROR ((this->*step) ());
     if (finding_.verdict () == Verdict::fail) {
       finding_.sort ();

@@ -413,10 +413,7 @@ PhotonTransferRun::diagnose ()
 {
   finding_.measure (kChange, moved_);
   const int bits = examination_.rig.parts ().bits;
-  if (const int missing = missing_bits (); missing > 0)
-    finding_.blame ("missing-bits", "the lowest " + std::to_string (missing) +
-                                        " of " + std::to_string (bits) +
-                                        " bits are always 0");
+  finding_.judge_bits (missing_bits (), bits);
   diagnose_black ();
   const bool known = !finding_.is_ill ();
   const double light = signal (levels_.back ().means) / largest_;

@@ -132,6 +132,22 @@ TEST (SecondCheck, NamesWhatIsWrong)
   }
 }
 
+TEST (SecondCheck, SeesWhatItsCameraDoesNotSay)
+{
+  const std::pair<const char *, const char *> faults[] = {{"colour", "colour"},
+      {"noise-reduction=0.4", "noise-reduction"},
+      {"missing-bits=4", "missing-bits"}};
+  int seed = 31;
+  for (const auto &[fault, name] : faults) {
+    const CheckedBench e = check_bench (
+        bench_of_two (seed += 2, std::string ("second:mute second:") + fault),
+        check_second_alone);
+    ASSERT_EQ (e.finding.diagnoses.size (), 1u) << fault;
+    EXPECT_EQ (e.finding.verdict (), Verdict::fail) << fault;
+    EXPECT_EQ (e.first_diagnosis (), name) << fault;
+  }
+}
+
 /** Its exposure and its mapping are not known then. */
 TEST (SecondCheck, DoesNotJudgeWhatFollowsFromItsLight)
 {
@@ -139,6 +155,16 @@ TEST (SecondCheck, DoesNotJudgeWhatFollowsFromItsLight)
       check_bench (bench_of_two (4, "second:bright=1.6"), check_second_alone);
   ASSERT_EQ (e.finding.diagnoses.size (), 1u);
   EXPECT_EQ (e.first_diagnosis (), "second-bright");
+}
+
+TEST (SecondCheck, SaysWhatItDoesNotCheck)
+{
+  const CheckedBench e = check_bench (bench_of_two (6), check_second_alone);
+  EXPECT_EQ (e.finding.verdict (), Verdict::pass) << e.first_diagnosis ();
+  EXPECT_TRUE (std::ranges::any_of (e.finding.notes, [] (const auto &note) {
+    return note.first == "not checked of the second camera" &&
+           note.second.find ("linearity") != note.second.npos;
+  }));
 }
 
 TEST (SecondCheck, ALongerWayOfItsFramesIsSaid)

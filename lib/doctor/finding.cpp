@@ -90,12 +90,13 @@ Finding::judge (
   if (const std::size_t at = text.find ("{}"); at != text.npos)
     text.replace (at, 2, codedexposure::shown (number.value));
   const std::string what = *rule.reading == 0 ? rule.id : rule.reading;
+  const std::string unit = std::string (*rule.unit == 0 ? "" : " ") + rule.unit;
   if (!is_finite (number))
     text = what + " could not be measured: it should be " +
-           text_of (rule.good) + " " + rule.unit;
+           text_of (rule.good) + unit;
   else if (verdict == Verdict::unknown)
     text = what + " is " + codedexposure::shown (number.value) + " +- " +
-           codedexposure::shown (number.sigma) + " " + rule.unit +
+           codedexposure::shown (number.sigma) + unit +
            ", too uncertain to tell whether it is " + text_of (rule.good);
   blame (rule.id, std::move (text), verdict, rule.remedy);
   return verdict;

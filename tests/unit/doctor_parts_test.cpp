@@ -297,6 +297,19 @@ TEST (Findings, WhatMayBeBeyondTheLimitIsNotGood)
       "most 1");
 }
 
+TEST (Findings, AReadingWithoutAUnitHasNoGap)
+{
+  Finding finding{"whole", "your schedule"};
+  finding.judge ("slots-differ", {0.01, 0.0057});
+  finding.judge ("slots-differ", {NAN, NAN});
+  EXPECT_EQ (finding.diagnoses.at (0).cause,
+      "largest difference of a slot is 0.0100 +- 0.00570, too uncertain to "
+      "tell whether it is -0.02 to 0.02");
+  EXPECT_EQ (finding.diagnoses.at (1).cause,
+      "largest difference of a slot could not be measured: it should be -0.02 "
+      "to 0.02");
+}
+
 TEST (Findings, TheirJsonHasTheWorstVerdict)
 {
   Finding good{"a", "light"}, bad{"b", "more \"light\""};

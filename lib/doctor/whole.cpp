@@ -122,7 +122,8 @@ diagnose_times (const Recording &counts, FrameRate rate, Finding &finding)
 {
   if (counts.delays.size () < 2)
     return;
-  const double jitter = spread_of (counts.delays).sigma;
+  /* In whole nanoseconds, as times are. */
+  const double jitter = std::round (spread_of (counts.delays).sigma);
   finding.readings.push_back ({"jitter of arrival",
       {jitter / 1e3, jitter / 1e3 / std::sqrt (2.0 * double (counts.frames))},
       "us"});

@@ -95,6 +95,14 @@ TEST (WholeCheck, NamesWhatIsWrong)
     expect_named (words, check_whole);
 }
 
+TEST (WholeCheck, SaysTheJitterInWholeNanoseconds)
+{
+  const CheckedBench e = check_bench (sick_bench (4, ""), check_whole);
+  const Reading *jitter = e.finding.reading ("jitter of arrival");
+  ASSERT_TRUE (jitter);
+  EXPECT_EQ (jitter->number.value, 0.0);
+}
+
 TEST (WholeCheck, DoesNotKnowSlotsWithoutAMapping)
 {
   const CheckedBench e = check_bench (healthy_bench (3), check_whole);

@@ -200,7 +200,7 @@ advise (Arguments arguments)
   if (arguments.bench) {
     bench = value_of (BenchProfile::parse (*arguments.bench), Exit::usage);
     use_bench (conditions.camera, *bench);
-    if (const auto old = bench->why_old (now_utc ()))
+    if (const auto old = bench->why_doubtful (now_utc ()))
       arguments.say (*old);
   }
   use_options (conditions.camera, arguments);

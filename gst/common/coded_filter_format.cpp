@@ -218,7 +218,7 @@ CodedFilter::find_bench (CodedFormat &format)
     if (stream_.bench && !fits (given.check_bench (*stream_.bench)))
       return false;
     stream_.bench = given;
-    const auto old = given.why_old (now_utc ());
+    const auto old = given.why_doubtful (now_utc ());
     if (old && !std::exchange (stream_.warned_of_bench, true))
       POST_WARNING (element_, RESOURCE, SETTINGS, *old);
   } else if (stream_.bench && stream_.settings.schedule.read) {

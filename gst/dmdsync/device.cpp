@@ -117,7 +117,7 @@ read_bench (GstDmdSync *self)
                      : std::nullopt;
   });
   if (st.bench)
-    if (const auto old = st.bench->why_old (now_utc ()))
+    if (const auto old = st.bench->why_doubtful (now_utc ()))
       POST_WARNING (self, RESOURCE, SETTINGS, *old);
   return true;
 }

@@ -256,9 +256,13 @@ BenchProfile::check_bench (const BenchProfile &other) const
 }
 
 std::optional<std::string>
-BenchProfile::why_old (std::chrono::sys_seconds now) const
+BenchProfile::why_doubtful (std::chrono::sys_seconds now) const
 {
   const auto age = std::chrono::floor<std::chrono::days> (now - measured);
+  if (age < -std::chrono::days (1)) // clocks are in any time zone
+    return "The bench profile was measured " + std::to_string (-age.count ()) +
+           " days after now, by the clock of this machine; set the clock, or "
+           "measure the bench again.";
   if (age <= kMaxAge)
     return std::nullopt;
   return "The bench profile was measured " + std::to_string (age.count ()) +

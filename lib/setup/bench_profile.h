@@ -124,9 +124,9 @@ struct BenchProfile {
       const std::string &what, const Device &profiled, const Device &found);
   /** check_device () of camera and DMD of another profile of the same bench. */
   Result<void> check_bench (const BenchProfile &other) const;
-  /** What to say of a profile that is older than kMaxAge at @p now; none
-   * otherwise. */
-  std::optional<std::string> why_old (std::chrono::sys_seconds now) const;
+  /** What to say of a profile that at @p now is older than kMaxAge, or not yet
+   * measured; none otherwise. */
+  std::optional<std::string> why_doubtful (std::chrono::sys_seconds now) const;
 
   bool operator== (const BenchProfile &) const = default;
 };

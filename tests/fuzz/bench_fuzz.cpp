@@ -22,8 +22,8 @@ LLVMFuzzerTestOneInput (const std::uint8_t *data, std::size_t size)
   require (std::isfinite (gain) && gain > 0.0, "no gain", text);
   check (profile->check_frames ({64, 48}, 8));
   check (profile->check_bench (*profile));
-  if (const auto old =
-          profile->why_old (std::chrono::sys_days (std::chrono::days (20000))))
+  if (const auto old = profile->why_doubtful (
+          std::chrono::sys_days (std::chrono::days (20000))))
     check (Error{*old});
   return 0;
 }

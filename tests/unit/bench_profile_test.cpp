@@ -299,12 +299,16 @@ TEST (BenchProfile, ShowsItsNumbersToPeople)
   EXPECT_TRUE (has ("full well", "9870 ± 40 e-"));
 }
 
-TEST (BenchProfile, SaysThatItIsOld)
+TEST (BenchProfile, SaysThatItIsOldOrOfTheFuture)
 {
   const BenchProfile profile = plain ();
-  EXPECT_FALSE (profile.why_old (profile.measured - 24h));
-  EXPECT_FALSE (profile.why_old (profile.measured + BenchProfile::kMaxAge));
-  const auto old = profile.why_old (profile.measured + 31 * 24h);
+  EXPECT_FALSE (profile.why_doubtful (profile.measured - 24h));
+  EXPECT_EQ (profile.why_doubtful (profile.measured - 49h),
+      "The bench profile was measured 3 days after now, by the clock of this "
+      "machine; set the clock, or measure the bench again.");
+  EXPECT_FALSE (
+      profile.why_doubtful (profile.measured + BenchProfile::kMaxAge));
+  const auto old = profile.why_doubtful (profile.measured + 31 * 24h);
   ASSERT_TRUE (old.has_value ());
   EXPECT_EQ (
       old->rfind ("The bench profile was measured 31 days ago. ", 0), 0u);

@@ -46,15 +46,20 @@ check_head (const Json &root, const JsonHead &head)
 }
 
 std::int64_t
-integer (const Json &value, const std::string &key, std::int64_t highest)
+integer (const Json &value, const std::string &key, std::int64_t highest,
+    int lowest = 0)
 {
   const bool fits =
       value.is_number_unsigned ()
-          ? value.get<std::uint64_t> () <= std::uint64_t (highest)
-          : value.is_number_integer () && value.get<std::int64_t> () == 0;
+          ? value.get<std::uint64_t> () >= std::uint64_t (lowest) &&
+                value.get<std::uint64_t> () <= std::uint64_t (highest)
+          : value.is_number_integer () && value.get<std::int64_t> () == 0 &&
+                lowest == 0;
   if (!fits)
-    throw expected (
-        key, "a whole number from 0 to " + std::to_string (highest), value);
+    throw expected (key,
+        "a whole number from " + std::to_string (lowest) + " to " +
+            std::to_string (highest),
+        value);
   return value.get<std::int64_t> ();
 }
 
@@ -175,10 +180,10 @@ integer_into (std::int64_t &to, std::int64_t highest)
 }
 
 JsonReader
-integer_into (int &to, int highest)
+integer_into (int &to, int highest, int lowest)
 {
-  return [&to, highest] (const Json &value, const std::string &key) {
-    to = int (integer (value, key, highest));
+  return [&to, highest, lowest] (const Json &value, const std::string &key) {
+    to = int (integer (value, key, highest, lowest));
   };
 }
 

@@ -78,7 +78,7 @@ JsonReader integers_into (
 /** A list of any length. */
 JsonReader integers_into (std::vector<int> &to, int highest);
 JsonReader integer_into (std::int64_t &to, std::int64_t highest);
-JsonReader integer_into (int &to, int highest);
+JsonReader integer_into (int &to, int highest, int lowest = 0);
 
 /** Finite numbers, as many as there are in @p to. */
 JsonReader numbers_into (std::span<double> to);

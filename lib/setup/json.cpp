@@ -110,7 +110,7 @@ read_bench_profile (const Json &root)
             device_into (*profile.dmd) (value, key);
           }},
       {"pixel_format", text_into (profile.pixel_format)},
-      {"bits", integer_into (profile.bits, 16), true},
+      {"bits", integer_into (profile.bits, 16, 1), true},
   };
   for (const BenchQuantity &quantity : bench_quantities ())
     keys.push_back ({quantity.key,

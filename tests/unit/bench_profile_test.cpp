@@ -196,6 +196,9 @@ TEST (BenchProfile, RefusesWhatItDoesNotKnow)
   EXPECT_EQ (refusal (R"("bits":12,)", ""),
       start + "key 'bits' is missing; a bench profile needs at least format, "
               "version, measured, camera and bits");
+  for (const char *bits : {"0", "17", "-1"})
+    EXPECT_EQ (refusal (R"("bits":12)", std::string (R"("bits":)") + bits),
+        start + "key 'bits' must be a whole number from 1 to 16, not " + bits);
   EXPECT_EQ (refusal (R"({"value":9870.0,"sigma":40.0})", "9870"),
       start + "key 'full_well' must be an object, not 9870");
   EXPECT_EQ (refusal (R"(,"sigma":40.0)", ""),

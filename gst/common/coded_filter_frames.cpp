@@ -186,10 +186,14 @@ CodedFilter::check_time_stamp (GstBuffer *frame) const
 {
   if (stream_.segment.format != GST_FORMAT_TIME)
     return GST_FLOW_ERROR;
-  if (GST_BUFFER_PTS_IS_VALID (frame))
+  const GstClockTime pts = GST_BUFFER_PTS (frame);
+  if (pts <= GstClockTime (kFarthestTime))
     return GST_FLOW_OK;
-  post_error ("A coded frame has no time stamp (PTS). Let the source set one, "
-              "for example with do-timestamp=true.");
+  post_error (
+      GST_CLOCK_TIME_IS_VALID (pts)
+          ? too_far_text (pts)
+          : "A coded frame has no time stamp (PTS). Let the source set one, "
+            "for example with do-timestamp=true.");
   return GST_FLOW_ERROR;
 }
 

@@ -71,6 +71,15 @@ time_or_none (const std::optional<Nanoseconds> &time)
 
 } // namespace
 
+std::string
+too_far_text (GstClockTime time)
+{
+  return "A coded frame has a time of " + std::to_string (time) +
+         " ns, but none may be farther from 0 than 73 years (" +
+         std::to_string (kFarthestTime) +
+         " ns). Let the source begin its times near 0.";
+}
+
 std::vector<const char *>
 flag_names (GstBuffer *buffer)
 {

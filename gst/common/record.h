@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <gst/gst.h>
@@ -28,6 +29,9 @@ FrameRecord record_of (GstBuffer *frame, const GstVideoInfo &info,
  * zero of the frame's clock. */
 void apply_record (
     GstBuffer *frame, const FrameRecord &record, GstClockTimeDiff offset);
+
+/** The error of a frame at @p time, which is beyond kFarthestTime. */
+std::string too_far_text (GstClockTime time);
 
 /** Names of the flags of @p buffer that describe its quality: "discont",
  * "corrupted", "gap", "droppable". */

@@ -211,12 +211,7 @@ has_times_of_recording (GstCodedExposureLog *self, const FrameRecord &record)
 {
   const auto time = record.too_far ();
   if (time)
-    POST_ERROR (self, STREAM, FORMAT,
-        "A coded frame has a time of " + std::to_string (*time) +
-            " ns, but a recording has none that is farther from 0 than 73 "
-            "years (" +
-            std::to_string (kFarthestTime) +
-            " ns). Let the source begin its times near 0.");
+    POST_ERROR (self, STREAM, FORMAT, too_far_text (GstClockTime (*time)));
   return !time;
 }
 

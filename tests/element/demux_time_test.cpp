@@ -295,6 +295,16 @@ TEST_F (DemuxTime, FrameWithoutTimeStampIsAnError)
   EXPECT_FALSE (demux->pull ());
 }
 
+TEST_F (DemuxTime, FrameOfATimeThatIsTooFarIsAnError)
+{
+  start ();
+  push (0);
+  const GstClockTime pts = GstClockTime (1) << 63;
+  EXPECT_EQ (demux->push (coded_frame (pts)), GST_FLOW_ERROR);
+  EXPECT_NE (demux->error ().find (std::to_string (pts) + " ns, but none may"),
+      std::string::npos);
+}
+
 TEST_F (DemuxTime, UpstreamDiscontIsGivenOnOnce)
 {
   start ();

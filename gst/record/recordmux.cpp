@@ -295,15 +295,19 @@ follow_tags (GstElement *self, GstEvent *event)
 std::string
 change_of_video (const GstCaps *before, const GstCaps *after)
 {
-  const auto text_in = [] (const GstCaps *caps, const char *field) {
+  const auto text_in = [] (const GstCaps *caps, const char *field,
+                           const char *without) {
     const GValue *value =
         gst_structure_get_value (gst_caps_get_structure (caps, 0), field);
     const CharPtr text (value ? gst_value_serialize (value) : nullptr);
-    return std::string (text ? text.get () : "");
+    return std::string (text ? text.get () : without);
   };
-  for (const char *field : {"format", "width", "height", "framerate"}) {
-    const std::string was = text_in (before, field);
-    const std::string is = text_in (after, field);
+  constexpr std::pair<const char *, const char *> kFields[] = {{"format", ""},
+      {"width", ""}, {"height", ""}, {"framerate", ""},
+      {"interlace-mode", "progressive"}};
+  for (const auto &[field, without] : kFields) {
+    const std::string was = text_in (before, field, without);
+    const std::string is = text_in (after, field, without);
     if (!was.empty () && !is.empty () && was != is)
       return std::string ("The ") + field + " of the frames changes from " +
              was + " to " + is;

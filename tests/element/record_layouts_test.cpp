@@ -120,17 +120,34 @@ TEST (RecordEncoded, TheyAreCopiedOrRefused)
         record_encoded (codec, reader).find ("codec=copy"), std::string::npos);
 }
 
-TEST (RecordedFrames, OfAnotherRateAreAnErrorThatSaysSo)
+/* How it ends where frames of the caps @p then follow others. */
+std::string
+record_change (const std::string &then, const std::string &codec = "ffv1")
 {
   const std::string frames = "videotestsrc num-buffers=3 ! ";
+  return Pipeline (
+      frames + gray_caps (64, 48, "25/1") +
+      " ! concat name=all ! codedexposure-recordmux codec=" + codec +
+      " ! fakesink " + frames + gray_caps (64, 48, "25/1") +
+      " ! capssetter caps=video/x-raw," + then + " ! all.")
+      .play ();
+}
+
+TEST (RecordedFrames, OfAnotherRateAreAnErrorThatSaysSo)
+{
   EXPECT_NE (
-      Pipeline (frames + gray_caps (64, 48, "25/1") +
-                " ! concat name=all ! codedexposure-recordmux ! fakesink " +
-                frames + gray_caps (64, 48, "50/1") + " ! all.")
-          .play ()
+      record_change ("framerate=50/1")
           .find ("The framerate of the frames changes from 25/1 to 50/1, but a "
                  "recording has one for all. Begin another recording"),
       std::string::npos);
+}
+
+TEST (RecordedFrames, ThatBecomeInterlacedAreAnErrorThatSaysSo)
+{
+  for (const std::string codec : {"ffv1", "raw"})
+    EXPECT_NE (record_change ("interlace-mode=interleaved", codec)
+                   .find ("changes from progressive to interleaved"),
+        std::string::npos);
 }
 
 TEST (RecordedFrames, OfAnotherColorimetryAreRecorded)

@@ -203,7 +203,8 @@ bool
 begins_before (const GstSegment &segment, GstBuffer *frame)
 {
   return GST_BUFFER_PTS_IS_VALID (frame) &&
-         GST_BUFFER_PTS (frame) < segment.start;
+         !GST_CLOCK_TIME_IS_VALID (
+             running_time (segment, GST_BUFFER_PTS (frame)));
 }
 
 bool

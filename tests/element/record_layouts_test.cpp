@@ -177,9 +177,11 @@ TEST (RecordedFrames, FartherThanTheTimesOfARecordingAreAnErrorThatSaysSo)
   }
 }
 
-/* From 15 ms to 45 ms, at the @rate, a double. */
+using ChangeSegment = void (*) (GstSegment &);
+
+/* By a ChangeSegment, @change. */
 GstPadProbeReturn
-cut_segment (GstPad *, GstPadProbeInfo *info, gpointer rate) noexcept
+on_segment (GstPad *, GstPadProbeInfo *info, gpointer change) noexcept
 {
   GstEvent *event = GST_PAD_PROBE_INFO_EVENT (info);
   if (GST_EVENT_TYPE (event) != GST_EVENT_SEGMENT)
@@ -187,23 +189,51 @@ cut_segment (GstPad *, GstPadProbeInfo *info, gpointer rate) noexcept
   GstSegment segment;
   gst_event_copy_segment (event, &segment);
   gst_event_unref (event);
-  segment.rate = *static_cast<const double *> (rate);
-  segment.start = segment.time = 15 * GST_MSECOND;
-  segment.stop = 45 * GST_MSECOND;
+  reinterpret_cast<ChangeSegment> (change) (segment);
   info->data = gst_event_new_segment (&segment);
   return GST_PAD_PROBE_OK;
 }
 
-TEST (RecordedFrames, OfASegmentThatCutsTwoAreWhole)
+/* Of what the element `change` sends. */
+void
+change_segment (const Pipeline &pipeline, ChangeSegment change)
 {
-  double forwards = 1;
+  gst_pad_add_probe (pipeline.pad ("change", "src").get (),
+      GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, on_segment,
+      reinterpret_cast<gpointer> (change), nullptr);
+}
+
+/* 10 ms apart, at the positions 0 to 40 ms. */
+std::string
+five_frames (const std::string &codec = "ffv1")
+{
+  return "videotestsrc num-buffers=5 ! " + gray_caps (64, 48, "100/1") +
+         " ! identity name=change ! codedexposure-recordmux codec=" + codec +
+         " ! ";
+}
+
+void
+cut (GstSegment &segment)
+{
+  segment.start = segment.time = 15 * GST_MSECOND;
+  segment.stop = 45 * GST_MSECOND;
+}
+
+struct Cut {
+  const char *name;
+  ChangeSegment change;
+};
+
+class CutSegments : public ::testing::TestWithParam<Cut>
+{
+};
+
+TEST_P (CutSegments, HaveThreeWholeFrames)
+{
   for (const std::string codec : {"ffv1", "raw"}) {
-    Pipeline pipeline (
-        "videotestsrc num-buffers=5 ! " + gray_caps (64, 48, "100/1") +
-        " ! identity name=cut ! codedexposure-recordmux codec=" + codec +
-        " ! codedexposure-recorddemux name=demux ! fakesink");
-    gst_pad_add_probe (pipeline.pad ("cut", "src").get (),
-        GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, cut_segment, &forwards, nullptr);
+    Pipeline pipeline (five_frames (codec) +
+                       "codedexposure-recorddemux name=demux ! fakesink");
+    change_segment (pipeline, GetParam ().change);
     std::atomic<bool> is_cut = false;
     const ObjectPtr<GstElement> demux = pipeline["demux"];
     const ObjectPtr<GstElement> top (
@@ -225,15 +255,24 @@ TEST (RecordedFrames, OfASegmentThatCutsTwoAreWhole)
   }
 }
 
+/* As a negative offset of a pad does. */
+void
+leave_two_out (GstSegment &segment)
+{
+  segment.offset = 20 * GST_MSECOND;
+}
+
+INSTANTIATE_TEST_SUITE_P (All, CutSegments,
+    ::testing::Values (Cut{"WithinTwo", cut}, Cut{"ByOffset", leave_two_out}),
+    [] (const auto &tested) { return tested.param.name; });
+
 TEST (RecordedFrames, ThatComeBackwardsAreAnErrorThatSaysSo)
 {
-  double backwards = -1;
-  Pipeline pipeline ("videotestsrc num-buffers=5 ! " +
-                     gray_caps (64, 48, "100/1") +
-                     " ! identity name=cut ! codedexposure-recordmux "
-                     "! fakesink");
-  gst_pad_add_probe (pipeline.pad ("cut", "src").get (),
-      GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, cut_segment, &backwards, nullptr);
+  Pipeline pipeline (five_frames () + "fakesink");
+  change_segment (pipeline, [] (GstSegment &segment) {
+    cut (segment);
+    segment.rate = -1;
+  });
   EXPECT_NE (pipeline.play ().find ("played forwards"), std::string::npos);
 }
 

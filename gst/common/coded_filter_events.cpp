@@ -133,10 +133,7 @@ gboolean
 CodedFilter::on_segment (EventPtr event)
 {
   gst_event_copy_segment (event.get (), &stream_.upstream);
-  if (stream_.upstream.format != GST_FORMAT_TIME) {
-    post_error (
-        std::string ("The segment of the coded frames has the format ") +
-        gst_format_get_name (stream_.upstream.format) + "; it must be TIME.");
+  if (!counts_time (element_, stream_.upstream)) {
     stream_.end_segment ();
     return FALSE;
   }

@@ -114,6 +114,19 @@ refuse_buffer (gpointer element, const GstVideoInfo &info, GstBuffer *buffer)
 }
 
 bool
+counts_time (gpointer element, const GstSegment &segment)
+{
+  if (segment.format == GST_FORMAT_TIME)
+    return true;
+  POST_ERROR (element, STREAM, FORMAT,
+      std::string ("The segment of the frames counts in ") +
+          gst_format_get_name (segment.format) +
+          ", but their times are needed. Let the source count in time, as "
+          "appsrc does with format=time.");
+  return false;
+}
+
+bool
 refuse_settings (gpointer element, const std::string &why)
 {
   POST_ERROR (element, RESOURCE, SETTINGS, why);

@@ -182,6 +182,8 @@ void set_up_passing (gpointer transform);
 /** Posts that @p buffer cannot be mapped as a frame of @p info. */
 GstFlowReturn refuse_buffer (
     gpointer element, const GstVideoInfo &info, GstBuffer *buffer);
+/** False, with an error, if the times of frames in @p segment are not known. */
+bool counts_time (gpointer element, const GstSegment &segment);
 /** Posts an error of the settings. Returns false. */
 bool refuse_settings (gpointer element, const std::string &why);
 /** Posts that the latency has changed. */

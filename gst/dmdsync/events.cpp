@@ -192,11 +192,7 @@ gboolean
 take_segment (GstDmdSync *self, GstEvent *event)
 {
   Stream &stream = state (self).stream;
-  const GstSegment *segment = segment_of (event);
-  if (segment->format != GST_FORMAT_TIME) {
-    POST_ERROR (self, STREAM, FORMAT,
-        "Frames must come in TIME, not in " +
-            std::string (gst_format_get_name (segment->format)));
+  if (!counts_time (self, *segment_of (event))) {
     gst_event_unref (event);
     return FALSE;
   }

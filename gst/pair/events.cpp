@@ -75,8 +75,9 @@ follow (GstCodedExposurePair *self, bool on, GstEvent *event)
   case GST_EVENT_CAPS:
     return take_caps (self, on, caps_of (event));
   case GST_EVENT_SEGMENT:
-    if (!on)
-      break;
+    st.refused |= !counts_time (self, *segment_of (event));
+    if (st.refused || !on)
+      return !st.refused;
     st.has_begun = false;
     gst_aggregator_update_segment (GST_AGGREGATOR (self), segment_of (event));
     break;

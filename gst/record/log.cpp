@@ -223,7 +223,7 @@ transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
   LogState &state = self->state;
   if (state.is_raw && !holds_frame (base, state.info, frame))
     return GST_FLOW_ERROR;
-  if (base->segment.rate < 0)
+  if (base->segment.rate < 0 || base->segment.format != GST_FORMAT_TIME)
     return GST_FLOW_ERROR;
   if (begins_before (base->segment, frame))
     return GST_BASE_TRANSFORM_FLOW_DROPPED;
@@ -350,6 +350,8 @@ GstEvent *
 open_end (GstCodedExposureLog *self, GstEvent *event)
 {
   GstSegment segment = *segment_of (event);
+  if (!counts_time (self, segment))
+    return event;
   if (segment.rate < 0) {
     POST_ERROR (self, STREAM, FORMAT,
         "The frames come backwards, but a recording has them in the order of "

@@ -102,7 +102,7 @@ TEST_F (DemuxStream, SegmentThatIsNotInTimeIsAnError)
   GstSegment segment;
   gst_segment_init (&segment, GST_FORMAT_BYTES);
   demux->push_event (gst_event_new_segment (&segment));
-  EXPECT_NE (demux->error ().find ("bytes"), std::string::npos);
+  EXPECT_NE (demux->error ().find ("counts in bytes"), std::string::npos);
   EXPECT_EQ (demux->push (coded_frame (0)), GST_FLOW_ERROR);
 }
 

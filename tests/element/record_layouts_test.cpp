@@ -276,6 +276,17 @@ TEST (RecordedFrames, ThatComeBackwardsAreAnErrorThatSaysSo)
   EXPECT_NE (pipeline.play ().find ("played forwards"), std::string::npos);
 }
 
+TEST (RecordedFrames, WhoseTimesAreNotKnownAreAnErrorThatSaysSo)
+{
+  for (const std::string codec : {"ffv1", "raw"}) {
+    Pipeline pipeline (five_frames (codec) + "fakesink");
+    change_segment (pipeline, [] (GstSegment &segment) {
+      gst_segment_init (&segment, GST_FORMAT_BYTES);
+    });
+    EXPECT_NE (pipeline.play ().find ("counts in bytes"), std::string::npos);
+  }
+}
+
 TEST (RecordBins, OfADescriptionHaveThePadOfItsFirstElement)
 {
   for (const char *element :

@@ -241,10 +241,9 @@ restore (Self *self, GstBuffer *frame, const TrackReader::Match &match)
   if (is_repeated (state, match))
     state.damage.frame_repeated ();
   if (!state.is_complete || !state.last_frame ||
-      GST_BUFFER_PTS (frame) > state.last_pts) {
-    state.last_frame = std::max (record.frame, state.last_frame.value_or (0));
+      GST_BUFFER_PTS (frame) > state.last_pts)
     state.last_pts = GST_BUFFER_PTS (frame);
-  }
+  state.last_frame = std::max (record.frame, state.last_frame.value_or (0));
   if (!std::exchange (state.found_line, true))
     gst_pad_push_event (
         state.src, gst_event_new_custom (GST_EVENT_CUSTOM_DOWNSTREAM_STICKY,

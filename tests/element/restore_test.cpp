@@ -120,6 +120,16 @@ TEST_F (Restore, AfterALateFrameNothingIsMissing)
     EXPECT_EQ (get_frame_meta (restored.at (i).get ())->lost_before, 0u) << i;
 }
 
+/* As those without a meta, which are counted as they come. */
+TEST_F (Restore, BehindALateFrameOfALaterNumberNothingIsMissing)
+{
+  recording = Recording ({0, 1, 3, 2, 4, 5}, {10, 11, 13, 12, 14, 15});
+  play ();
+  for (const std::size_t i : {3, 4, 5})
+    EXPECT_EQ (get_frame_meta (restored.at (i).get ())->lost_before, 0u) << i;
+  EXPECT_FALSE (GST_BUFFER_IS_DISCONT (restored[4].get ()));
+}
+
 TEST_F (Restore, AFrameThatIsMissingIsSaid)
 {
   play (4);

@@ -44,6 +44,16 @@ name_of (const std::string &begin, GstBuffer *first)
   return free_name (begin + number);
 }
 
+/* Without a full stop. That of a frame says what to do. */
+std::string
+with_remedy (const GError &error)
+{
+  const std::string text = error.message;
+  if (error.domain == GST_RESOURCE_ERROR)
+    return text + " Free space on the disk, and keep again";
+  return text.substr (0, text.find_last_not_of ('.') + 1);
+}
+
 /* Why @pipeline has not come to its end; "": it has. */
 std::string
 failure_of (GstElement *pipeline)
@@ -56,7 +66,7 @@ failure_of (GstElement *pipeline)
     return "";
   GError *error = nullptr;
   gst_message_parse_error (message.get (), &error, nullptr);
-  std::string text = error->message;
+  const std::string text = with_remedy (*error);
   g_error_free (error);
   return text;
 }
@@ -96,7 +106,7 @@ write (
   };
   GstElement *mux = add ("codedexposure-recordmux"), *sink = add ("filesink");
   if (!mux || !sink)
-    return "its elements are not installed.";
+    return "its elements are not installed";
   gst_element_link (mux, sink);
   g_object_set (mux, "threads", 1, "log-location", sidecar.c_str (), nullptr);
   g_object_set (sink, "location", recording.c_str (), nullptr);
@@ -168,11 +178,10 @@ write_kept (KeptFrames frames, const std::string &begin)
   }
   const std::string failed =
       write (std::move (frames), recording.path (), sidecar.path ());
-  Result<void> done = failed.empty ()
-                          ? recording.publish (false)
-                          : Error{"cannot write " + name + ": " + failed +
-                                      " Free space on the disk, and keep again",
-                                ErrorCode::io};
+  Result<void> done =
+      failed.empty ()
+          ? recording.publish (false)
+          : Error{"cannot write " + name + ": " + failed, ErrorCode::io};
   if (done)
     done = sidecar.publish (false);
   if (done)

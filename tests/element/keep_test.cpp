@@ -448,6 +448,18 @@ TEST_F (Keep, WhatCannotBeWrittenIsSaid)
   EXPECT_EQ (property<guint64> (keep_->element (), "recordings"), 0u);
 }
 
+TEST_F (Keep, WhatCannotBeRecordedIsSaidWithItsOwnRemedy)
+{
+  begin ();
+  push (gst_util_uint64_scale (G_MAXINT64, 1, kPeriod), 50);
+  keep ();
+  end ();
+  const std::string said = keep_->warning ();
+  EXPECT_TRUE (said.ends_with ("Let the source begin its times near 0."))
+      << said;
+  EXPECT_EQ (files (), 0u);
+}
+
 /* The name of the lines is longer by two letters. */
 TEST_F (Keep, WithoutItsLinesNothingIsLeftOfARecording)
 {

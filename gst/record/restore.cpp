@@ -466,6 +466,7 @@ sink_event (GstPad *pad, GstObject *parent, GstEvent *owned) noexcept
     state.partners.let_wait (true);
     forget_frames (state);
     state.whole = false;
+    state.is_unwanted = true; // until a segment says what is
   }
   if (!(gst_event_type_get_flags (type) & GST_EVENT_TYPE_SERIALIZED) ||
       type == GST_EVENT_FLUSH_STOP)

@@ -66,7 +66,7 @@ struct Run {
   HeldItems held;
   guint32 segment_seqnum = GST_SEQNUM_INVALID; ///< of the segment
   bool is_complete = true;                     ///< all its frames are to come
-  bool is_unwanted = false; ///< downstream has ended: frames do not reach it
+  bool is_unwanted = false; ///< no more frames are to reach downstream
   std::optional<StreamSetup> container;     ///< setup of the container's tags
   std::vector<StreamSetup> others;          ///< those before it
   std::shared_ptr<const StreamSetup> setup; ///< in force

@@ -102,6 +102,19 @@ TEST_F (Restore, AfterASeekTheFramesBeforeItAreNotMissed)
   EXPECT_FALSE (file.posted<StreamIncomplete> ());
 }
 
+/* A decoder keeps the segment if no frame of it comes. */
+TEST_F (Restore, ASeekToWhereNoFrameIsDoesNotCutTheStream)
+{
+  push_line (0);
+  push_frame (0);
+  for (const auto &pad : {track.get (), file.get ()}) {
+    gst_harness_push_event (pad, gst_event_new_flush_start ());
+    gst_harness_push_event (pad, gst_event_new_flush_stop (TRUE));
+  }
+  end ();
+  EXPECT_FALSE (file.posted<StreamCut> ());
+}
+
 TEST_F (Restore, AFrameWhoseTimeTheFileRoundedUpStaysInTheSegment)
 {
   g_object_set (file.element (), "tick", guint64 (1000), nullptr);

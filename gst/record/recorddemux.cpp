@@ -217,11 +217,29 @@ salvages (gpointer self)
   return state_in<Self> (self).salvage;
 }
 
+/* A demuxer stops at the end of the first of two recordings. */
+void
+warn_of_rest (Self *self, GstPad *pad)
+{
+  const guint64 end = self->state.stream.head->end;
+  gint64 size = 0;
+  if (salvages (self) || end == 0 ||
+      !gst_pad_peer_query_duration (pad, GST_FORMAT_BYTES, &size) ||
+      std::cmp_less_equal (size, end)) // -1: not known
+    return;
+  POST_WARNING (self, STREAM, DEMUX,
+      "Behind the end of the recording, the file has " +
+          std::to_string (guint64 (size) - end) +
+          " bytes more, such as another recording, which are not read. Use "
+          "each recording from a file of its own.");
+}
+
 /* A demuxer passes over some bytes of a head without reading them. Returns what
  * is wrong; null: nothing. */
 const char *
-read_head (RecordDemuxState &state, guint64 at, GstBuffer *bytes)
+read_head (Self *self, GstPad *pad, guint64 at, GstBuffer *bytes)
 {
+  RecordDemuxState &state = self->state;
   constexpr gsize kLongestHead = 1 << 20;
   Stream &stream = state.stream;
   const gsize size = gst_buffer_get_size (bytes);
@@ -237,6 +255,7 @@ read_head (RecordDemuxState &state, guint64 at, GstBuffer *bytes)
   if (stream.head->tick == 0)
     return MatroskaHead::kNoTick;
   state.coded.set_tick (stream.head->tick);
+  warn_of_rest (self, pad);
   return nullptr;
 }
 
@@ -250,8 +269,8 @@ on_bytes (GstPad *pad, GstPadProbeInfo *info, gpointer self) noexcept
   GstBuffer *bytes = GST_PAD_PROBE_INFO_BUFFER (info);
   const gsize size = gst_buffer_get_size (bytes);
   const bool pulled = GST_PAD_PROBE_INFO_TYPE (info) & GST_PAD_PROBE_TYPE_PULL;
-  const char *why =
-      read_head (state, pulled ? info->offset : stream.pushed, bytes);
+  const char *why = read_head (
+      as<Self> (self), pad, pulled ? info->offset : stream.pushed, bytes);
   stream.pushed += size;
   if (state.has_new_frame.exchange (false))
     stream.bytes_without_frame = 0;

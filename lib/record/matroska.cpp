@@ -123,6 +123,7 @@ std::optional<MatroskaHead>
 head_of (Source &file, const Element &segment)
 {
   MatroskaHead head;
+  head.end = segment.is_open ? 0 : segment.end;
   bool complete = false;
   file.each (segment, [&] (const Element &part) {
     if (part.end > file.size ())

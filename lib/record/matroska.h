@@ -32,6 +32,8 @@ struct MatroskaHead {
                                          "frames have the same time; write 1, "
                                          "which recordings have, into the byte "
                                          "behind 2A D7 B1 81";
+  /** Where the recording ends in the file; 0: not known. */
+  std::uint64_t end = 0;
   /** Numbers of the tracks of frames and of their lines; 0: there is none. */
   std::uint64_t video = 0, lines = 0;
   /** Frames of a second camera, if the file has a second track of lines, too.

@@ -4,6 +4,11 @@
  */
 #include <atomic>
 #include <filesystem>
+#include <fstream>
+#include <functional>
+
+#include <fcntl.h>
+#include <unistd.h>
 
 #include "common/messages.h"
 #include "pipeline.h"
@@ -224,6 +229,16 @@ struct Cut {
   ChangeSegment change;
 };
 
+/* The messages of the pipeline of @element. */
+void
+watch (GstElement *element, GstBusSyncHandler handler, gpointer data)
+{
+  const ObjectPtr<GstElement> top (
+      GST_ELEMENT (gst_object_get_parent (GST_OBJECT (element))));
+  const ObjectPtr<GstBus> bus (gst_element_get_bus (top.get ()));
+  gst_bus_set_sync_handler (bus.get (), handler, data, nullptr);
+}
+
 class CutSegments : public ::testing::TestWithParam<Cut>
 {
 };
@@ -236,17 +251,14 @@ TEST_P (CutSegments, HaveThreeWholeFrames)
     change_segment (pipeline, GetParam ().change);
     std::atomic<bool> is_cut = false;
     const ObjectPtr<GstElement> demux = pipeline["demux"];
-    const ObjectPtr<GstElement> top (
-        GST_ELEMENT (gst_object_get_parent (GST_OBJECT (demux.get ()))));
-    const ObjectPtr<GstBus> bus (gst_element_get_bus (top.get ()));
-    gst_bus_set_sync_handler (
-        bus.get (),
+    watch (
+        demux.get (),
         [] (GstBus *, GstMessage *message, gpointer data) {
           if (parse_message<StreamCut> (message))
             *static_cast<std::atomic<bool> *> (data) = true;
           return GST_BUS_PASS;
         },
-        &is_cut, nullptr);
+        &is_cut);
     EXPECT_EQ (pipeline.play (), "");
     EXPECT_EQ (counter_of (demux.get (), "frames"), 3u);
     EXPECT_EQ (counter_of (demux.get (), "frames-unknown"), 0u);
@@ -303,6 +315,60 @@ TEST (RecordBins, OfADescriptionHaveThePadOfItsFirstElement)
         gst_pad_get_parent_element (target.get ()));
     EXPECT_STREQ (GST_OBJECT_NAME (owner.get ()), "first");
   }
+}
+
+GstBusSyncReply
+take_warning (GstBus *, GstMessage *message, gpointer text)
+{
+  if (GST_MESSAGE_TYPE (message) != GST_MESSAGE_WARNING)
+    return GST_BUS_PASS;
+  GError *error = nullptr;
+  gst_message_parse_warning (message, &error, nullptr);
+  *static_cast<std::string *> (text) = error->message;
+  g_error_free (error);
+  return GST_BUS_PASS;
+}
+
+/* Whose length a source does not know; that of five frames fits into it. */
+void
+read_from_pipe (const std::string &path,
+    const std::function<void (const std::string &)> &read)
+{
+  std::string bytes (std::filesystem::file_size (path), '\0');
+  std::ifstream (path, std::ios::binary)
+      .read (bytes.data (), std::streamsize (bytes.size ()));
+  int ends[2];
+  ASSERT_EQ (pipe2 (ends, O_CLOEXEC), 0);
+  EXPECT_EQ (
+      write (ends[1], bytes.data (), bytes.size ()), ssize_t (bytes.size ()));
+  close (ends[1]);
+  read ("fdsrc fd=" + std::to_string (ends[0]));
+  close (ends[0]);
+}
+
+TEST (RecordDemux, SaysWhatIsBehindTheEnd)
+{
+  const std::string path =
+      "/tmp/record_twice_test_" + std::to_string (getpid ()) + ".mkv";
+  ASSERT_EQ (
+      Pipeline (five_frames () + "filesink location=" + path).play (), "");
+  std::string warning;
+  const auto read = [&] (const std::string &source) {
+    Pipeline reading (
+        source + " ! codedexposure-recorddemux name=demux ! fakesink");
+    watch (reading["demux"].get (), take_warning, &warning);
+    EXPECT_EQ (reading.play (), "");
+    EXPECT_EQ (counter_of (reading["demux"].get (), "frames"), 5u);
+  };
+  const std::string from_file = "filesrc location=" + path;
+  read (from_file);
+  EXPECT_EQ (warning, "");
+  read_from_pipe (path, read);
+  EXPECT_EQ (warning, "");
+  std::ofstream (path, std::ios::binary | std::ios::app) << "another";
+  read (from_file);
+  EXPECT_NE (warning.find ("the file has 7 bytes more"), std::string::npos);
+  std::filesystem::remove (path);
 }
 
 TEST (RecordSegments, BeginWhileTheLastOneIsFinished)

@@ -97,7 +97,8 @@ Window::begin (Calls calls)
   snapshots_.begin (
       [this] (const auto &files) { calls_.wrote (files, ""); }, calls_.failed);
   watch_screen ([this] {
-    calls_.failed ("the connection to the screen is lost");
+    calls_.failed ("the connection to the screen is lost; check the X server, "
+                   "and the network to it, and start again");
     calls_.end ();
   });
   if (setup_.player)

@@ -455,7 +455,7 @@ private:
   }
   bool find_mapping (Extent camera, std::optional<Mapping> &mapping);
   bool find_rectifier (CodedFormat &format);
-  bool check_camera (CodedFormat &format) const;
+  bool match_camera (CodedFormat &format) const;
   void adopt (CodedFormat format, GstBuffer *next);
   void report_change (const Schedule &before, GstBuffer *next);
   void set_provenance (GstBuffer *next);

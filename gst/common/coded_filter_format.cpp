@@ -96,7 +96,7 @@ CodedFilter::find_format ()
   format.size = {info.width, info.height};
   if (stream_.not_coded)
     return refused (*stream_.not_coded);
-  if (!find_schedule (format) || !check_camera (format) || !find_bench (format))
+  if (!find_schedule (format) || !match_camera (format) || !find_bench (format))
     return std::nullopt;
   auto slots = SlotPlan::fit (
       format.schedule.timing (), format.schedule.slots (), format.rate);
@@ -139,9 +139,10 @@ CodedFilter::find_schedule (CodedFormat &format)
 }
 
 /* Frames that were cropped, scaled or timed anew no longer show what the tag
- * says. A container has the frame period in nanoseconds, the tag the rate. */
+ * says. The rate becomes that of the tag: a container has the frame period, in
+ * whole nanoseconds. */
 bool
-CodedFilter::check_camera (CodedFormat &format) const
+CodedFilter::match_camera (CodedFormat &format) const
 {
   if (stream_.settings.schedule.read)
     return true;

@@ -62,15 +62,15 @@ std::optional<Result<Provenance>> provenance_from_tags (const GstTagList *tags);
  * its frames; 0: not known. @p event: any, in turn. */
 void follow_tagged_bits (GstEvent *event, int &bits);
 
-/** If the tags of @p event say that its frames were decoded before: a message
- * of an element that takes coded frames only, there @p where: " of pad off". */
-std::optional<std::string> why_not_coded (
-    GstEvent *event, const char *where = "");
 /** What else to do with recordings of the two beams, after "or". */
 constexpr const char kDecodeTwo[] =
     "use \"codedexposure decode FIRST.mkv --fuse QUALITY --second "
     "SECOND.mkv\", whose SECOND.mkv has the beam of the mirrors that are off.";
 
+/** If the tags of @p event say that its frames were decoded before: a message
+ * of an element that takes coded frames only, there @p where: " of pad off". */
+std::optional<std::string> why_not_coded (
+    GstEvent *event, const char *where = "");
 /** Posts it as an error of @p element. */
 void refuse_decoded (gpointer element, GstEvent *event);
 

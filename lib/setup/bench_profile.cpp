@@ -259,7 +259,7 @@ std::optional<std::string>
 BenchProfile::why_doubtful (std::chrono::sys_seconds now) const
 {
   const auto age = std::chrono::floor<std::chrono::days> (now - measured);
-  if (age < -std::chrono::days (1)) // clocks are in any time zone
+  if (age < -std::chrono::days (1)) // clocks may be set to local time
     return "The bench profile was measured " + std::to_string (-age.count ()) +
            " days after now, by the clock of this machine; set the clock, or "
            "measure the bench again.";

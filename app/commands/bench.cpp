@@ -139,8 +139,8 @@ Bench::declare (Options &options)
       "in place of COMMAND: the camera is at this address of the present "
       "network, until Ctrl-C; reads more faults, such as lose@now:3, from "
       "standard input");
-  options.flag (
-      "--log", log_, "print a line of JSON for every frame that is sent");
+  options.flag ("--log", log_,
+      "print a line of JSON for every frame that a camera sends");
   source_.declare (options, SourceOptions::Kind::simulated);
   /* The bench of --dmd has light in place of a scene, and its numbers in
    * --faults. */
@@ -179,12 +179,14 @@ Bench::camera_options (int number) const
   options.packet_loss = packet_loss_.value_or (0);
   options.seed = source_.seed.value_or (options.seed);
   options.outputs = !no_outputs_;
-  options.set_up = [this] (const CameraSettings &settings) {
-    std::fprintf (stderr, "bench: the camera sends %s\n",
+  options.set_up = [address = options.address] (
+                       const CameraSettings &settings) {
+    std::fprintf (stderr, "bench: %s: the camera sends %s\n", address.c_str (),
         camera_settings_text (settings).c_str ());
   };
   if (log_)
-    options.sent = print_sent;
+    options.sent = [address = options.address] (
+                       const SentFrame &sent) { print_sent (address, sent); };
   return options;
 }
 

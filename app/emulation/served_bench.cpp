@@ -205,11 +205,11 @@ ServedBench::open (const std::string &board, const std::string &faults,
 }
 
 void
-print_sent (const SentFrame &sent)
+print_sent (const std::string &address, const SentFrame &sent)
 {
-  std::printf ("{\"frame\":%llu,\"device_ns\":%lld,\"host_ns\":%lld,"
-               "\"fault\":\"%s\"}\n",
-      static_cast<unsigned long long> (sent.frame),
+  std::printf ("{\"camera\":\"%s\",\"frame\":%llu,\"device_ns\":%lld,"
+               "\"host_ns\":%lld,\"fault\":\"%s\"}\n",
+      address.c_str (), static_cast<unsigned long long> (sent.frame),
       static_cast<long long> (sent.device_time),
       static_cast<long long> (sent.host_time), fault_text (sent.fault.kind));
   std::fflush (stdout);

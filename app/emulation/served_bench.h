@@ -56,7 +56,7 @@ private:
   std::vector<std::unique_ptr<GigeCamera>> cameras_;
 };
 
-/** Prints a line of JSON for a frame that was sent. */
-void print_sent (const SentFrame &sent);
+/** Prints a line of JSON for a frame that the camera at @p address sent. */
+void print_sent (const std::string &address, const SentFrame &sent);
 
 } // namespace codedexposure

@@ -349,7 +349,12 @@ inflict (SickBenchOptions &bench, std::string_view words)
 {
   SickBenchOptions changed = bench;
   std::set<std::string_view> names;
-  for (const std::string_view piece : split (words, ' ')) {
+  auto pieces = split (words, ' ');
+  /* It draws all numbers, and those of other words win. */
+  std::ranges::stable_partition (pieces, [] (std::string_view piece) {
+    return piece.substr (0, piece.find ('=')).ends_with ("healthy");
+  });
+  for (const std::string_view piece : pieces) {
     if (piece.empty ())
       continue;
     const std::string_view name = piece.substr (0, piece.find ('='));

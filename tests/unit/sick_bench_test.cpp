@@ -412,6 +412,15 @@ TEST (SickBench, RandomBenchesAreMade)
   ASSERT_TRUE (inflict (drawn, "healthy=7 leak=0.1").ok ());
   EXPECT_EQ (drawn.full_well, random_healthy_bench (7).full_well);
   EXPECT_EQ (drawn.leak, 0.1);
+  SickBenchOptions other;
+  other.second = {second_camera_of (other)};
+  ASSERT_TRUE (
+      inflict (other, "leak=0.1 healthy=7 second:blur=2 second:healthy=8")
+          .ok ());
+  EXPECT_EQ (other.full_well, drawn.full_well);
+  EXPECT_EQ (other.leak, 0.1);
+  EXPECT_EQ (other.second.front ().blur, 2.0);
+  EXPECT_EQ (other.second.front ().seed, 8u);
   for (std::uint64_t seed = 0; seed < 200; seed++) {
     SickBenchOptions like;
     like.bits = seed % 2 == 0 ? 8 : 12;

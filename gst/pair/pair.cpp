@@ -251,35 +251,43 @@ end (GstCodedExposurePair *self)
   return GST_FLOW_EOS;
 }
 
+/* As its metadata say, else its tags; 0: not known, or all of the format. */
+int
+said_bits (const PairStream &stream, GstBuffer *frame)
+{
+  const auto meta = get_frame_meta (frame);
+  if (meta && meta->bits > 0)
+    return meta->bits;
+  return stream.setup ? stream.setup->bits : 0;
+}
+
 std::string
-depth_text (const PairStream &stream)
+depth_text (const PairStream &stream, int bits)
 {
   std::string text =
       gst_video_format_to_string (GST_VIDEO_INFO_FORMAT (&stream.info));
-  if (stream.setup && stream.setup->bits > 0)
-    text += " with " + std::to_string (stream.setup->bits) + " bits";
+  if (bits > 0)
+    text += " with " + std::to_string (bits) + " bits";
   return text;
 }
 
 /* What uses partners reads their pixels as those of coded frames. False if they
  * differ, which is posted. */
 bool
-check_depth (GstCodedExposurePair *self)
+check_depth (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
 {
   PairState &st = state (self);
   if (!st.on.caps || !st.off.caps)
     return true;
-  const auto bits_of = [] (const PairStream &stream) {
-    return stream.setup ? stream.setup->bits : 0;
-  };
-  const int bits = bits_of (st.on), other = bits_of (st.off);
+  const int bits = said_bits (st.on, coded);
+  const int other = said_bits (st.off, partner);
   if (GST_VIDEO_INFO_FORMAT (&st.on.info) ==
           GST_VIDEO_INFO_FORMAT (&st.off.info) &&
       (bits == 0 || other == 0 || bits == other))
     return true;
   POST_ERROR (self, STREAM, FORMAT,
-      "The frames of the first camera are " + depth_text (st.on) +
-          ", and those of the second are " + depth_text (st.off) +
+      "The frames of the first camera are " + depth_text (st.on, bits) +
+          ", and those of the second are " + depth_text (st.off, other) +
           ". Set both cameras to the same pixel format.");
   st.refused = true;
   return false;
@@ -352,7 +360,7 @@ aggregate (GstAggregator *aggregator, gboolean late)
   if (take_partner (self, head.get (), late && !is_silent, partner) ==
       Found::kWait)
     return GST_AGGREGATOR_FLOW_NEED_DATA;
-  if (partner && !check_depth (self))
+  if (partner && !check_depth (self, head.get (), partner.get ()))
     return GST_FLOW_ERROR;
   BufferPtr coded (gst_aggregator_pad_pop_buffer (on));
   return coded ? push (self, std::move (coded), std::move (partner))

@@ -185,6 +185,24 @@ TEST_F (Pair, CamerasOfDifferentBitsAreAnErrorThatNamesBoth)
       "pixel format.");
 }
 
+/* As codedexposure-camerasrc says them, which tags nothing. */
+TEST_F (Pair, SoAreThoseWhoseFramesSayTheirBits)
+{
+  for (GstHarness *camera : {pair.get (), off.get ()})
+    gst_harness_set_src_caps_str (
+        camera, gray_caps (kWidth / 2, kHeight, "25/1", "GRAY16_LE").c_str ());
+  auto on = frames ({0, 1}), partners = frames ({0, 1});
+  for (const BufferPtr &frame : on)
+    set_frame_meta (frame.get (), {.bits = 12});
+  for (const BufferPtr &frame : partners)
+    set_frame_meta (frame.get (), {.bits = 10});
+  EXPECT_EQ (run (std::move (on), std::move (partners)), Numbers{});
+  EXPECT_EQ (pair.error (),
+      "The frames of the first camera are GRAY16_LE with 12 bits, and those of "
+      "the second are GRAY16_LE with 10 bits. Set both cameras to the same "
+      "pixel format.");
+}
+
 TEST_F (Pair, TheSizesOfBothCamerasMayDiffer)
 {
   gst_harness_set_src_caps_str (

@@ -98,8 +98,10 @@ private:
     }
     if (info.recorded)
       json["recorded"] = *info.recorded;
-    if (info.head.has_partners ())
-      json["partners"] = info.partners;
+    if (info.head.has_partners ()) {
+      json["partners"] = info.partners - info.alone;
+      json["alone"] = info.alone;
+    }
     if (info.setup) {
       json["schedule"] = info.setup->schedule.text ();
       if (info.setup->rate)

@@ -223,10 +223,17 @@ struct Walk {
 };
 
 Result<TrackLine>
-last_line (Source &file, const Walk &walk)
+line_at (Source &file, std::uint64_t begin, std::uint64_t end)
 {
-  return TrackLine::from_json (file.bytes (walk.line,
-      std::min<std::size_t> (walk.line_end - walk.line, TrackLine::kMaxSize)));
+  return TrackLine::from_json (file.bytes (
+      begin, std::min<std::size_t> (end - begin, TrackLine::kMaxSize)));
+}
+
+bool
+stands_in (const Result<TrackLine> &line)
+{
+  return line && line->frame &&
+         std::ranges::count (line->frame->flags, "gap") > 0;
 }
 
 void
@@ -240,11 +247,13 @@ read_block (Source &file, const Element &part, Walk &walk, RecordingInfo &info)
   if (block->track == info.head.video)
     info.times.push_back (block->time);
   info.partners += block->track == info.head.partner_video;
+  if (block->track == info.head.partner_lines)
+    info.alone += stands_in (line_at (file, block->data, part.end));
   if (block->track != info.head.lines)
     return;
   walk.line = block->data, walk.line_end = part.end;
   if (!info.setup)
-    if (auto line = last_line (file, walk))
+    if (auto line = line_at (file, walk.line, walk.line_end))
       info.setup = std::move (line->setup);
 }
 
@@ -278,7 +287,7 @@ read_blocks (Source &file, const Element &segment, RecordingInfo &info)
       read_block (file, *part, walk, info);
   }
   if (walk.line_end > 0)
-    if (const auto line = last_line (file, walk))
+    if (const auto line = line_at (file, walk.line, walk.line_end))
       info.recorded = line->end;
 }
 

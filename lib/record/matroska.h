@@ -72,6 +72,8 @@ struct RecordingInfo {
   /** Frames of the second camera that are complete; there is one, or one that
    * stands in for it, of each coded frame. */
   std::uint64_t partners = 0;
+  /** Of these, those that only stand in, by their lines. */
+  std::uint64_t alone = 0;
   /** Frames that were recorded, by the last line; none: it is missing. */
   std::optional<std::uint64_t> recorded;
   /** Of the first frame whose line says it; none: not known. */

@@ -209,6 +209,8 @@ TEST_F (RecordPairs, BothTracksHaveAFrameOfEachTime)
       recording_info (at ("both.mkv").substr (0, at ("both.mkv").size () - 1));
   ASSERT_TRUE (info) << info.error ().message;
   EXPECT_EQ (info->times.size (), kFrames);
+  EXPECT_EQ (info->partners, kFrames);
+  EXPECT_EQ (info->alone, live.alone ().size ());
   EXPECT_TRUE (info->extras.empty ());
   ASSERT_TRUE (info->setup);
   ASSERT_TRUE (info->setup->partner);

@@ -31,4 +31,12 @@ struct MirrorsAnswer {
   CODED_FIELDS (width, height, patterns, reason);
 };
 
+/** Query: whether coded frames come from codedexposure-pair, so that they have
+ * partners as soon as the second camera sends frames. */
+struct PairsAnswer {
+  static constexpr const char *kName = "codedexposure/pairs";
+  bool come = false;
+  CODED_FIELDS (come);
+};
+
 } // namespace codedexposure::gst

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/caps.h"
+#include "common/events.h"
 #include "common/tag.h"
 #include "pair/pair.h"
 
@@ -182,6 +183,10 @@ src_event (GstAggregator *aggregator, GstEvent *event)
 gboolean
 src_query (GstAggregator *aggregator, GstQuery *query)
 {
+  if (is_query<PairsAnswer> (query)) {
+    answer_query (query, PairsAnswer{true});
+    return TRUE;
+  }
   if (GST_QUERY_TYPE (query) == GST_QUERY_CUSTOM)
     return gst_pad_peer_query (GST_PAD (sink (aggregator, "on")), query);
   return parent_class<GstAggregatorClass> (aggregator)

@@ -45,6 +45,7 @@
 #include "common/coded_filter.h"
 #include "common/element.h"
 #include "common/elements.h"
+#include "common/events.h"
 #include "common/partner_reader.h"
 #include "extract/beam_sum.h"
 #include "extract/saturation.h"
@@ -108,10 +109,12 @@ private:
   template <typename Pixel>
   Result<bool> add (CodedFrame &frame, MappedFrame &coded, MappedFrame &sum);
   GstFlowReturn pass_gap (GstCodedPad *pad, GstClockTime pts);
+  bool waits_for_partners () const;
 
   Settings settings_; ///< object lock
 
-  std::optional<Plan> plan_; ///< sink pad's stream lock
+  /** Sink pad's stream lock. None: frames have no partners yet. */
+  std::optional<Plan> plan_;
 };
 
 PropertyTable<Settings>
@@ -180,18 +183,29 @@ Sum::make_plan (const CodedFormat &format)
       {}};
 }
 
+/* Behind codedexposure-pair, whose second camera has sent nothing yet. */
+bool
+Sum::waits_for_partners () const
+{
+  const QueryPtr query (new_query<PairsAnswer> ());
+  return !tagged ().partner && gst_pad_peer_query (sinkpad (), query.get ());
+}
+
 bool
 Sum::plan (const CodedFormat &format, PadCaps &caps)
 {
-  auto made = make_plan (format);
-  if (!made)
-    return post_error (made.error ().message);
   const CapsPtr rectified = format.rectifier
                                 ? format.resized (format.size)
                                 : CapsPtr (gst_caps_ref (format.caps.get ()));
   CapsPtr &sum = caps.of (PadKind::all);
   sum.reset (
       scale_caps (rectified.get (), scale_for (format.schedule, nullptr)));
+  plan_.reset ();
+  if (waits_for_partners ())
+    return true;
+  auto made = make_plan (format);
+  if (!made)
+    return post_error (made.error ().message);
   gst_video_info_from_caps (&made->info, sum.get ());
   plan_ = *std::move (made);
   return true;
@@ -233,6 +247,8 @@ Sum::process (CodedFrame frame)
   GstCodedPad *pad = find_pad (*served, PadKind::all);
   if (frame.place != Place::inside)
     return GST_FLOW_OK;
+  if (!plan_)
+    return pass_gap (pad, frame.pts ());
   MappedFrame coded = map_coded (frame.buffer.get ());
   if (!coded)
     return GST_FLOW_ERROR;

@@ -227,4 +227,18 @@ TEST (SumBench, RunsBesideSubframes)
   }
 }
 
+/* As with a live source, whose second camera may come later. */
+TEST (SumBench, ASecondCameraThatHasSentNothingIsNoError)
+{
+  const std::string video =
+      " ! video/x-raw,format=GRAY8,width=64,height=48,framerate=100/1 "
+      "! codedexposure-sim schedule=sequential:lattice:4/2";
+  Pipeline pipeline ("videotestsrc num-buffers=40" + video +
+                     " ! pair.on videotestsrc num-buffers=0" + video +
+                     " beam=off ! pair.off codedexposure-pair name=pair "
+                     "! codedexposure-sum name=sum ! fakesink");
+  EXPECT_EQ (pipeline.play (), "");
+  EXPECT_EQ (property<guint64> (pipeline["sum"].get (), "frames-alone"), 10u);
+}
+
 } // namespace

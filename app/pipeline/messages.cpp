@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "common/beam.h"
 #include "common/messages.h"
 #include "pipeline/cameras.h"
 #include "pipeline/graph.h"
@@ -240,6 +241,36 @@ is_change_of_format (std::string_view kind, const Told &told)
              told.error.get (), GST_STREAM_ERROR, GST_STREAM_ERROR_FORMAT);
 }
 
+bool
+has_property (GstObject *object, const char *name)
+{
+  return g_object_class_find_property (G_OBJECT_GET_CLASS (object), name);
+}
+
+/* That @source reads, with a blank before it; empty: none, or the first that is
+ * found. */
+std::string
+camera_of (GstObject *source)
+{
+  gchar *name = nullptr;
+  if (has_property (source, "camera-name"))
+    g_object_get (source, "camera-name", &name, nullptr);
+  const CharPtr owned (name);
+  return name ? std::string (" ") + name : "";
+}
+
+bool
+is_of_second_camera (GstMessage *message)
+{
+  GstObject *source = GST_MESSAGE_SRC (message);
+  Beam beam = Beam::kOn;
+  if (has_property (source, "beam"))
+    g_object_get (source, "beam", &beam, nullptr);
+  return beam == Beam::kOff ||
+         gst_structure_has_field (
+             gst_message_get_structure (message), "camera");
+}
+
 } // namespace
 
 bool
@@ -257,10 +288,13 @@ told (GstMessage *message)
   gchar *file = nullptr;
   GstObject *source = GST_MESSAGE_SRC (message);
   if (parts.error->domain == GST_RESOURCE_ERROR &&
-      g_object_class_find_property (G_OBJECT_GET_CLASS (source), "location"))
+      has_property (source, "location"))
     g_object_get (source, "location", &file, nullptr);
   const CharPtr owned (file);
-  const std::string name = file ? file : GST_OBJECT_NAME (source);
+  const std::string camera = camera_of (source);
+  const std::string name = file               ? file
+                           : !camera.empty () ? "camera" + camera
+                                              : GST_OBJECT_NAME (source);
   if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_INFO && detail)
     return name + ": " + detail;
   return name + ": " + parts.error->message +
@@ -369,22 +403,22 @@ slip_text (int slots)
 } // namespace
 
 std::string
-notice (const GstStructure *message)
+notice (GstMessage *posted)
 {
-  const std::string of = gst_structure_has_field (message, "camera")
-                             ? " of the second camera"
-                             : "";
+  const GstStructure *message = gst_message_get_structure (posted);
+  const std::string of =
+      is_of_second_camera (posted) ? " of the second camera" : "";
   if (const auto lost = from_structure<FramesLost> (message))
     return "warning: coded frames" + of + " were lost before " +
            in_seconds (lost->to) + ": " + number (lost->count);
   if (const auto incomplete = from_structure<FrameIncomplete> (message))
-    return "warning: frame " + number (incomplete->frame) +
+    return "warning: frame " + number (incomplete->frame) + of +
            " arrived incomplete; check the connection of the camera";
   if (const auto late = from_structure<FrameLate> (message))
-    return "warning: frame " + number (late->frame) +
+    return "warning: frame " + number (late->frame) + of +
            " arrived after the next one";
   if (const auto slip = from_structure<Slip> (message))
-    return "warning: from frame " + number (slip->frame) +
+    return "warning: from frame " + number (slip->frame) + of +
            " on, the mirrors are " + slip_text (slip->slots) +
            "; these frames are flagged";
   if (const auto damaged = from_structure<FramesDamaged> (message))
@@ -428,7 +462,8 @@ notice (const GstStructure *message)
            number (incomplete->count) +
            "; the recording is damaged, or this is not its first part";
   if (const auto back = from_structure<CameraBack> (message))
-    return "the camera sends frames again, after " + in_seconds (back->silent);
+    return "the camera" + camera_of (GST_MESSAGE_SRC (posted)) +
+           " sends frames again, after " + in_seconds (back->silent);
   if (const auto phase = from_structure<MoirePhase> (message))
     return "phase found: --schedule " + quoted (phase->schedule);
   return {};

@@ -61,7 +61,7 @@ std::string fields_of (GstMessage *message);
 
 /** An element message about frames that were lost or damaged, as a warning for
  * the user; empty: it is about something else. */
-std::string notice (const GstStructure *message);
+std::string notice (GstMessage *posted);
 
 /** A value of the statistics of @p element; 0: it has none of that name. */
 guint64 counter_of (GstElement *element, const char *counter);

@@ -369,7 +369,7 @@ Run::on_element_message (const GstStructure *structure, GstMessage *message)
       std::ranges::count (
           job_.hurried, GST_ELEMENT (GST_MESSAGE_SRC (message))))
     return;
-  const std::string text = notice (structure);
+  const std::string text = notice (message);
   if (!text.empty () && std::exchange (noticed_, text) != text)
     status_.line (text);
 }

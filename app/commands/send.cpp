@@ -75,7 +75,8 @@ Send::declare (Options &options)
   beside_.declare_relations (options);
 }
 
-/* A receiver that is 10 s late is disconnected, to limit the memory. */
+/* A receiver for which 500 buffers wait, those of some 80 frames, is
+ * disconnected, to limit the memory. */
 void
 Send::add_server (Job &job, Chain &frames) const
 {

@@ -21,7 +21,7 @@ namespace
 {
 
 /* GstClientStatus is in no header that is installed. */
-enum Status { kClosed = 1, kRemoved = 2 };
+enum Status { kClosed = 1, kRemoved = 2, kSlow = 3 };
 
 int
 descriptor_of (GObject *socket)
@@ -98,6 +98,11 @@ Receivers::on_removed (
     GstElement *sink, GObject *socket, int status, gpointer data)
 {
   auto *self = static_cast<Receivers *> (data);
+  if (status == kSlow)
+    GST_ELEMENT_WARNING (sink, RESOURCE, WRITE,
+        ("A receiver was too slow and was disconnected; it lacks what follows. "
+         "It needs a faster network or disk, or less data (--codec ffv1)."),
+        (nullptr));
   const int descriptor = descriptor_of (socket);
   const bool begun = has_begun (sink, socket);
   const std::lock_guard lock (self->mutex_);

@@ -381,7 +381,10 @@ Mapping::pose_sigma () const
   };
   sigma.shift_x = std::sqrt ((*parts_.covariance)[2 * kParameters + 2]);
   sigma.shift_y = std::sqrt ((*parts_.covariance)[5 * kParameters + 5]);
-  sigma.rotation = of ([] (const Pose &s) { return s.rotation; });
+  /* 180 degrees are -180 degrees. */
+  sigma.rotation = of ([about = pose ().rotation] (const Pose &s) {
+    return std::remainder (s.rotation - about, 360.0);
+  });
   sigma.magnification = of ([] (const Pose &s) { return s.magnification; });
   sigma.stretch = of ([] (const Pose &s) { return s.stretch; });
   return sigma;

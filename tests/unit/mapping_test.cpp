@@ -218,6 +218,9 @@ TEST (Mapping, UncertaintyOfAShiftAndATurn)
   EXPECT_NEAR (sigma.shift_x, 0.01, 1e-12);
   EXPECT_NEAR (sigma.rotation, 0.01 / 383.5 * 180 / std::numbers::pi, 1e-7);
   EXPECT_NEAR (sigma.magnification, 0.0, 1e-7);
+
+  parts.homography = turned (180, 1);
+  EXPECT_NEAR (made (parts).pose_sigma ().rotation, sigma.rotation, 1e-7);
 }
 
 TEST (Mapping, RefusesWhatNoBenchHas)
@@ -429,8 +432,8 @@ TEST (StreamSetup, SaysHowTheSecondCameraStands)
   setup.partner->read_noise = 5.0;
   setup.partner->light_ratio = 0.75;
   const std::string measured = setup.to_json ();
-  EXPECT_NE (
-      measured.find (R"("electrons":31.25,"read_noise":5,"light_ratio":0.75}})"),
+  EXPECT_NE (measured.find (
+                 R"("electrons":31.25,"read_noise":5,"light_ratio":0.75}})"),
       std::string::npos)
       << measured;
   EXPECT_EQ (*StreamSetup::from_json (measured), setup);

@@ -225,6 +225,9 @@ Guide::on_mapping (const MoireMapping &mapping)
   StageCorrection remaining;
   remaining.deviation = mapping.move.deviation;
   status_.line (alignment_verdict (remaining, tolerance));
+  if (remaining.deviation <= tolerance)
+    status_.line ("decode with the mapping: only it says which mirrors the "
+                  "pixels see");
   check_files (mapping, "");
   if (!second_mapped_)
     check_files ({}, "second-");

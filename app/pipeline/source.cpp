@@ -237,6 +237,7 @@ camera_source (Job &job, const SourceOptions &options, const SourcePlan &plan)
   gst_child_proxy_set (GST_CHILD_PROXY (chain.last ()),
       "source::num-arv-buffers", kBuffers, nullptr);
   job.camera = chain.last ();
+  job.exposures = exposures_of (plan);
   return chain.caps (grey_caps (plan, plan.frame_rate));
 }
 
@@ -278,7 +279,6 @@ coded_source (
                                        {{"dmd", "sim:bench"}});
   if (options.camera) {
     watch_exposure (chain.last (), plan);
-    job.exposures = exposures_of (plan);
     job.source = "the camera " + *options.camera;
   } else if (options.source)
     job.source = "--source";

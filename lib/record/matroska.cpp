@@ -175,13 +175,16 @@ block_of (
   return Block{track->value, track->end + 3, time};
 }
 
-void
-read_extras (Source &file, const Element &part, RecordingInfo &info)
-{
+/** What read_blocks has seen. */
+struct Walk {
   std::size_t tracks = 0;
-  const std::size_t own = info.head.has_partners () ? 4
-                          : info.head.lines != 0    ? 2
-                                                    : 1;
+  std::uint64_t cluster = 0;            ///< its time
+  std::uint64_t line = 0, line_end = 0; ///< the last one
+};
+
+void
+read_extras (Source &file, const Element &part, Walk &walk, RecordingInfo &info)
+{
   if (part.id == kAttachments)
     info.extras.emplace_back ("attachments");
   else if (part.id == kChapters)
@@ -190,10 +193,21 @@ read_extras (Source &file, const Element &part, RecordingInfo &info)
     file.each (part, [&] (const Element &child) {
       if (part.id == kInfo && child.id == kTitle)
         info.extras.emplace_back ("a title");
-      tracks += part.id == kTracks && child.id == kTrackEntry;
+      walk.tracks += part.id == kTracks && child.id == kTrackEntry;
       return true;
     });
-  if (tracks > own)
+}
+
+/* A second recording in the file has the same tracks as a second camera. */
+void
+settle_tracks (const Walk &walk, RecordingInfo &info)
+{
+  if (!info.setup || !info.setup->partner)
+    info.partners = info.head.partner_video = info.head.partner_lines = 0;
+  const std::size_t own = info.head.has_partners () ? 4
+                          : info.head.lines != 0    ? 2
+                                                    : 1;
+  if (walk.tracks > own)
     info.extras.emplace_back ("other tracks, such as sound");
 }
 
@@ -215,12 +229,6 @@ next_cluster (Source &file, std::uint64_t at)
   }
   return file.size ();
 }
-
-/** What read_blocks has seen. */
-struct Walk {
-  std::uint64_t cluster = 0;            ///< its time
-  std::uint64_t line = 0, line_end = 0; ///< the last one
-};
 
 Result<TrackLine>
 line_at (Source &file, std::uint64_t begin, std::uint64_t end)
@@ -282,13 +290,14 @@ read_blocks (Source &file, const Element &segment, RecordingInfo &info)
     at = holds ? part->data : part->end;
     if (part->id == kTimestamp)
       walk.cluster = file.number (*part);
-    read_extras (file, *part, info);
+    read_extras (file, *part, walk, info);
     if (part->id == kBlock || part->id == kSimpleBlock)
       read_block (file, *part, walk, info);
   }
   if (walk.line_end > 0)
     if (const auto line = line_at (file, walk.line, walk.line_end))
       info.recorded = line->end;
+  settle_tracks (walk, info);
 }
 
 std::string

@@ -7,6 +7,7 @@
 
 #include "common/meta.h"
 #include "common/tag.h"
+#include "parts.h"
 
 namespace codedexposure::gst
 {
@@ -169,6 +170,7 @@ PartnerInput::restart ()
   left_.clear ();
   caps_.reset ();
   may_wait_ = is_wanted_ = true;
+  is_other_said_ = false;
   is_off_beam_ = has_ended_ = is_stalled_ = is_ahead_ = false;
   segments_ = {};
 }
@@ -261,8 +263,11 @@ PartnerInput::attach (
     GstElement *element, GstBuffer *frame, bool wanted, bool encoded)
 {
   want (wanted);
-  if (!wanted)
+  if (!wanted) {
+    if (gst_pad_is_linked (pad_) && !std::exchange (is_other_said_, true))
+      POST_WARNING (element, STREAM, DEMUX, kOtherVideo);
     return GST_FLOW_OK;
+  }
   const GstClockTime pts = GST_BUFFER_PTS (frame);
   std::optional<Partner> partner;
   if (const GstFlowReturn flow = take (element, frame, partner);

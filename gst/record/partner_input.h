@@ -47,7 +47,7 @@ public:
    * damaged partner, or one that stands in for a lost one, is only given to
    * frames that are @p encoded, to be recorded again with them.
    * @p wanted: the setup says that frames have partners; if not, those that
-   * come are dropped: other files may have further tracks, too.
+   * come are dropped, which a warning says.
    * @return GST_FLOW_OK; else the frame goes no further: GST_FLOW_FLUSHING: a
    * flush or a stop began; kBrokenOff: a seek left it without its partner. */
   GstFlowReturn attach (
@@ -81,6 +81,7 @@ private:
 
   GstPad *pad_ = nullptr;
   AloneFrames alone_;
+  bool is_other_said_ = false; ///< kOtherVideo
 
   std::mutex lock_;               ///< of the rest; never held while pushing
   std::condition_variable moved_; ///< any of it

@@ -64,6 +64,12 @@ remove_part (GstElement *bin, GstElement *&part)
   part = nullptr;
 }
 
+/** A warning. */
+inline constexpr const char *kOtherVideo =
+    "The file has more video than the frames of this recording, such as "
+    "another recording, which is not read. Use each recording from a file of "
+    "its own.";
+
 /** An error: the element @p factory is not installed. */
 inline std::string
 missing (const std::string &factory)

@@ -199,13 +199,23 @@ add_partner (Self *self)
 void
 on_no_more_pads (GstElement *file, gpointer self)
 {
-  const auto is_video = [] (GstElement *, GstPad *pad, gpointer) {
-    return gboolean (!g_str_has_prefix (GST_OBJECT_NAME (pad), "video_"));
+  struct {
+    int all = 0, unread = 0;
+  } videos;
+  const auto count = [] (GstElement *, GstPad *pad, gpointer data) {
+    auto &counted = *static_cast<decltype (videos) *> (data);
+    const bool is_video = g_str_has_prefix (GST_OBJECT_NAME (pad), "video_");
+    counted.all += is_video;
+    counted.unread += is_video && !gst_pad_is_linked (pad);
+    return gboolean (TRUE);
   };
-  if (gst_element_foreach_src_pad (file, is_video, nullptr))
+  add_partner (as<GstCodedExposureRecordDemux> (self));
+  gst_element_foreach_src_pad (file, count, &videos);
+  if (videos.all == 0)
     POST_ERROR (self, STREAM, WRONG_TYPE,
         "The file has no video. Use a recording of coded frames.");
-  add_partner (as<GstCodedExposureRecordDemux> (self));
+  else if (videos.unread > 0 && videos.all > 1)
+    POST_WARNING (self, STREAM, DEMUX, kOtherVideo);
 }
 
 /* ---------------------------------------------------------------- bytes -- */

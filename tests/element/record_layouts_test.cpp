@@ -318,13 +318,13 @@ TEST (RecordBins, OfADescriptionHaveThePadOfItsFirstElement)
 }
 
 GstBusSyncReply
-take_warning (GstBus *, GstMessage *message, gpointer text)
+add_warning (GstBus *, GstMessage *message, gpointer text)
 {
   if (GST_MESSAGE_TYPE (message) != GST_MESSAGE_WARNING)
     return GST_BUS_PASS;
   GError *error = nullptr;
   gst_message_parse_warning (message, &error, nullptr);
-  *static_cast<std::string *> (text) = error->message;
+  *static_cast<std::string *> (text) += error->message;
   g_error_free (error);
   return GST_BUS_PASS;
 }
@@ -356,7 +356,7 @@ TEST (RecordDemux, SaysWhatIsBehindTheEnd)
   const auto read = [&] (const std::string &source) {
     Pipeline reading (
         source + " ! codedexposure-recorddemux name=demux ! fakesink");
-    watch (reading["demux"].get (), take_warning, &warning);
+    watch (reading["demux"].get (), add_warning, &warning);
     EXPECT_EQ (reading.play (), "");
     EXPECT_EQ (counter_of (reading["demux"].get (), "frames"), 5u);
   };
@@ -368,6 +368,32 @@ TEST (RecordDemux, SaysWhatIsBehindTheEnd)
   std::ofstream (path, std::ios::binary | std::ios::app) << "another";
   read (from_file);
   EXPECT_NE (warning.find ("the file has 7 bytes more"), std::string::npos);
+  std::filesystem::remove (path);
+}
+
+TEST (RecordDemux, SaysThatItDoesNotReadAnotherVideo)
+{
+  const std::string path =
+      "/tmp/record_videos_test_" + std::to_string (getpid ()) + ".mkv";
+  const std::string frames = "videotestsrc num-buffers=5 ! " +
+                             gray_caps (64, 48, "100/1") + " ! mux. ";
+  for (const std::string more : {"", frames.c_str ()}) {
+    ASSERT_EQ (Pipeline (frames + more +
+                         "matroskamux name=mux ! filesink "
+                         "location=" +
+                         path)
+                   .play (),
+        "");
+    std::string warnings;
+    Pipeline reading ("filesrc location=" + path +
+                      " ! codedexposure-recorddemux name=demux ! fakesink");
+    watch (reading["demux"].get (), add_warning, &warnings);
+    EXPECT_EQ (reading.play (), "");
+    EXPECT_EQ (warnings.find ("another recording, which is not read") !=
+                   std::string::npos,
+        !more.empty ())
+        << warnings;
+  }
   std::filesystem::remove (path);
 }
 

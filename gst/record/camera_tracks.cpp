@@ -193,6 +193,29 @@ CameraTracks::on_decoded (
   return GST_PAD_PROBE_OK;
 }
 
+/* After it, the demuxer would post another error, of damage. */
+GstFlowReturn
+CameraTracks::decode (
+    GstPad *pad, GstObject *decoder, GstBuffer *frame) noexcept
+{
+  const auto &tracks = *static_cast<const CameraTracks *> (pad->chaindata);
+  const GstFlowReturn flow = tracks.decode_ (pad, decoder, frame);
+  if (flow != GST_FLOW_NOT_NEGOTIATED)
+    return flow;
+  const auto src = pad_of (GST_ELEMENT (decoder), "src");
+  const CapsPtr caps (gst_pad_get_current_caps (src.get ()));
+  const CapsPtr grey (gst_caps_from_string (CODED_EXPOSURE_VIDEO_CAPS));
+  if (caps && gst_caps_can_intersect (caps.get (), grey.get ()))
+    return flow;
+  POST_ERROR (tracks.element_, CORE, NEGOTIATION,
+      "The FFV1 frames have neither 8 nor 16 bits of grey, as another program "
+      "wrote them. Use the recording itself, or write the pixels in such a "
+      "format (\"ffmpeg -i IN.mkv -map 0 -c:s copy -c:v ffv1 -pix_fmt gray "
+      "OUT.mkv\", or gray16le); frames whose pixels are not those that were "
+      "recorded are flagged.");
+  return GST_FLOW_FLUSHING;
+}
+
 /* --------------------------------------------------------------- tracks -- */
 
 /* Before restore; none, if frames are raw or stay encoded. False, with an
@@ -222,10 +245,14 @@ CameraTracks::make_decoder (
     POST_ERROR (element_, CORE, MISSING_PLUGIN, missing ("avdec_ffv1"));
     return false;
   }
-  g_object_set (
-      decoder_, "max-threads", how.threads, "max-errors", -1, nullptr);
-  gst_pad_add_probe (pad_of (decoder_, "sink").get (),
-      GST_PAD_PROBE_TYPE_BUFFER, on_encoded, nullptr, nullptr);
+  /* Its pool crashes with pixels that GStreamer does not know. */
+  g_object_set (decoder_, "max-threads", how.threads, "max-errors", -1,
+      "direct-rendering", FALSE, nullptr);
+  const auto sink = pad_of (decoder_, "sink");
+  decode_ = GST_PAD_CHAINFUNC (sink.get ());
+  gst_pad_set_chain_function_full (sink.get (), decode, this, nullptr);
+  gst_pad_add_probe (
+      sink.get (), GST_PAD_PROBE_TYPE_BUFFER, on_encoded, nullptr, nullptr);
   gst_pad_add_probe (pad_of (decoder_, "src").get (), GST_PAD_PROBE_TYPE_BUFFER,
       on_decoded, this, nullptr);
   gst_bin_add (GST_BIN (element_), decoder_);

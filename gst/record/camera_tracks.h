@@ -70,12 +70,15 @@ private:
       GstPad *pad, GstPadProbeInfo *info, gpointer self) noexcept;
   static GstPadProbeReturn on_decoded (
       GstPad *, GstPadProbeInfo *info, gpointer self) noexcept;
+  static GstFlowReturn decode (
+      GstPad *pad, GstObject *decoder, GstBuffer *frame) noexcept;
   bool take_raw (GstPad *pad, const GstCaps *caps, const FrameReading &how);
   bool make_decoder (GstPad *pad, const GstCaps *caps, const FrameReading &how);
 
   GstElement *element_;
   ObjectPtr<GstElement> restore_;
   GstElement *queue_ = nullptr, *decoder_ = nullptr;
+  GstPadChainFunction decode_ = nullptr; ///< of the decoder
   Deep deep_;
   Nanoseconds duration_ = 0; ///< of a frame, by the head; 0: not known
   GstClockTime decoded_ = GST_CLOCK_TIME_NONE; ///< time of the last frame

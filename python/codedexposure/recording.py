@@ -182,7 +182,8 @@ class Recording:
         at = head.find(b"\x18\x53\x80\x67", 0, 4096)
         size = head[at + 4:at + 12]
         # One that was not finished, or went through a pipe, says no length.
-        self._open = at < 0 or len(size) < 8 or size[0] != 1
+        self._open = (at < 0 or len(size) < 8 or size[0] != 1
+                      or size[1:] == b"\xff" * 7)
         # It is shorter than its head says, or ended without its last line.
         self._cut = (b"S_TEXT/UTF8" not in head if self._open else
                      at + 12 + int.from_bytes(size[1:], "big")

@@ -254,6 +254,17 @@ class Faults(unittest.TestCase):
         self.assertGreater(len(frames), 8)
         self.assertTrue(decoded("plain.mkv").startswith(pixels(frames)))
 
+    def test_without_length(self):
+        data = bytearray((SCRATCH / "plain.mkv").read_bytes())
+        at = data.index(b"\x18\x53\x80\x67") + 4
+        data[at:at + 8] = b"\x01" + b"\xff" * 7
+        (SCRATCH / "stream.mkv").write_bytes(data)
+        frames, said = read("stream.mkv")
+        self.assertEqual(pixels(frames), decoded("plain.mkv"))
+        self.assertEqual(said, "")
+        (SCRATCH / "stream.mkv").write_bytes(data[:len(data) // 2])
+        self.assertIn("the recording is cut off", read("stream.mkv")[1])
+
     def test_cut_with_a_hole(self):
         data = (SCRATCH / "plain.mkv").read_bytes()
         begins = [at.start() for at in re.finditer(b"\x1f\x43\xb6\x75", data)]

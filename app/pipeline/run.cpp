@@ -327,12 +327,21 @@ Run::on_error (GstMessage *message)
 namespace
 {
 
-/* Of a recording that is cut off: whether frames may follow its damage. */
+/* Whether frames may follow the last one that was read, behind damage. A part
+ * that another program cut out has no last line either. */
 bool
-has_damage_within (const std::string &recording)
+goes_on (const Job &job, GstMessage *stream_cut)
 {
-  const auto info = recording_info (recording);
-  return info && info->is_damaged;
+  const auto info = recording_info (job.source);
+  const auto is_of_reader = [&] {
+    return gst_object_has_as_ancestor (
+        GST_MESSAGE_SRC (stream_cut), GST_OBJECT (job.reader));
+  };
+  const auto has_more = [&] {
+    return info->times.size () > counter_of (job.reader, "frames");
+  };
+  return info && (info->is_damaged ||
+                     (job.is_finished && (!is_of_reader () || has_more ())));
 }
 
 } // namespace
@@ -355,7 +364,7 @@ Run::on_element_message (const GstStructure *structure, GstMessage *message)
   /* A demuxer takes the length that damage claims, which may be all the rest.
    */
   if (name == "codedexposure/stream-cut" && !job_.salvage &&
-      (job_.is_finished || has_damage_within (job_.source))) {
+      goes_on (job_, message)) {
     container_damaged_ = true;
     end (Exit::failed);
     return;

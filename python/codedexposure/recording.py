@@ -228,8 +228,6 @@ class Recording:
     def _goes_on(self, last: int | None, decoded: bool) -> bool:
         """Of one whose end was not reached: whether frames follow the last one
         that was, behind damage."""
-        if not (self._cut or self._open):
-            return True
         with Player(self._description("", True, decode=False), self.path,
                     quiet=True) as player:
             return any((last is None or position_of(sample) > last)

@@ -5,10 +5,12 @@ import csv
 import json
 import os
 import re
+import subprocess
+import sys
 import unittest
 import warnings
 
-from rig import SCRATCH, clean, decoded, pixels, run, simulate
+from rig import ROOT, SCRATCH, clean, decoded, pixels, run, simulate
 import numpy as np
 import codedexposure
 from codedexposure.frame import pixels_of
@@ -264,6 +266,16 @@ class Faults(unittest.TestCase):
         self.assertEqual(said, "")
         (SCRATCH / "stream.mkv").write_bytes(data[:len(data) // 2])
         self.assertIn("the recording is cut off", read("stream.mkv")[1])
+
+    def test_part_without_its_last_line(self):
+        subprocess.run([sys.executable, ROOT / "tests/support/matroska.py",
+                        "lose", SCRATCH / "plain.mkv", SCRATCH / "part.mkv",
+                        "12"], check=True)
+        frames, said = read("part.mkv")
+        self.assertEqual(pixels(frames), decoded("plain.mkv"))
+        self.assertIn("the recording is cut off", said)
+        self.assertNotIn("damaged", said)
+        self.assertEqual(len(opened("part.mkv").coded()), 12)
 
     def test_cut_with_a_hole(self):
         data = (SCRATCH / "plain.mkv").read_bytes()

@@ -115,6 +115,16 @@ CameraTracks::on_deep_frame (
   return GST_PAD_PROBE_HANDLED;
 }
 
+/* As on_deep_frame. One of all its pixels, without the bytes between rows, goes
+ * on to an error that says so. */
+GstPadProbeReturn
+on_raw_frame (GstPad *, GstPadProbeInfo *info, gpointer pixels) noexcept
+{
+  const gsize size = gst_buffer_get_size (GST_PAD_PROBE_INFO_BUFFER (info));
+  return size < GPOINTER_TO_SIZE (pixels) ? GST_PAD_PROBE_DROP
+                                          : GST_PAD_PROBE_OK;
+}
+
 /* False: their format is none of coded frames. */
 bool
 CameraTracks::take_raw (
@@ -123,8 +133,12 @@ CameraTracks::take_raw (
   const GstStructure *structure = gst_caps_get_structure (caps, 0);
   const gchar *format = gst_structure_get_string (structure, "format");
   if (gst_structure_has_name (structure, "video/x-raw") &&
-      g_strcmp0 (format, "GRAY16_LE") != 0)
+      g_strcmp0 (format, "GRAY16_LE") != 0) {
+    gst_pad_add_probe (pad, GST_PAD_PROBE_TYPE_BUFFER, on_raw_frame,
+        GSIZE_TO_POINTER (gsize (how.size.width) * gsize (how.size.height)),
+        nullptr);
     return g_strcmp0 (format, "GRAY8") == 0;
+  }
   if (how.pixel_bytes != 2 || how.size.width < 1 || how.size.height < 1)
     return false;
   deep_.caps = deep_caps_of (how.size);

@@ -142,9 +142,13 @@ add_frames (Self *self, CameraTracks &tracks, GstPad *pad)
   tracks.add_frames (pad, how);
 }
 
+/* A frame whose time is damaged is dropped; the track says that it is missing.
+ */
 GstPadProbeReturn
 on_stored (GstPad *pad, GstPadProbeInfo *info, gpointer self) noexcept
 {
+  if (!GST_BUFFER_PTS_IS_VALID (GST_PAD_PROBE_INFO_BUFFER (info)))
+    return GST_PAD_PROBE_DROP;
   const LargeFrames &large = state_in<Self> (self).stream.large;
   const ObjectPtr<GstElement> demuxer (gst_pad_get_parent_element (pad));
   info->data = large.put_back (

@@ -71,6 +71,8 @@ using namespace codedexposure::gst;
 namespace
 {
 
+constexpr const char *kRequested = "video_0";
+
 enum class Codec { ffv1, raw, copy };
 
 struct Settings {
@@ -90,10 +92,8 @@ struct Branch : MuxerInput {
 struct RecordMuxState {
   /* Object lock: */
   Settings settings;
-  GstPad *requested = nullptr; ///< in place of the sink pad
 
   /* Of the bin: */
-  GstPad *sink = nullptr;
   GstElement *mux = nullptr; ///< null: matroskamux is missing
   Branch coded, partner;
 
@@ -426,47 +426,37 @@ src_event (GstPad *pad, GstObject *parent, GstEvent *event) noexcept
 {
   if (GST_EVENT_TYPE (event) != GST_EVENT_SEEK)
     return gst_pad_event_default (pad, parent, event);
-  ObjectPtr<GstPad> sink;
-  {
-    const auto &state = state_in<Self> (parent);
-    const ObjectLock lock (parent);
-    sink.reset (GST_PAD (
-        gst_object_ref (state.requested ? state.requested : state.sink)));
-  }
-  return gst_pad_push_event (sink.get (), event);
+  auto *self = as<GstElement> (parent);
+  const auto requested = pad_of (self, kRequested);
+  const auto sink = pad_of (self, "sink");
+  return gst_pad_push_event (requested ? requested.get () : sink.get (), event);
 }
 
-/* splitmuxsink asks for the pad of the video. */
+/* splitmuxsink asks for the pad of the video, which it gets in place of the
+ * sink pad. */
 GstPad *
 request_new_pad (GstElement *self, GstPadTemplate *templ, const gchar *,
     const GstCaps *) noexcept
 {
-  auto &state = state_in<Self> (self);
-  {
-    const ObjectLock lock (self);
-    if (state.requested)
-      return nullptr;
-  }
-  gst_ghost_pad_set_target (GST_GHOST_PAD (state.sink), nullptr);
-  GstPad *pad = gst_ghost_pad_new_from_template (
-      "video_0", pad_of (state.coded.log, "sink").get (), templ);
+  if (pad_of (self, kRequested))
+    return nullptr;
+  gst_ghost_pad_set_target (
+      GST_GHOST_PAD (pad_of (self, "sink").get ()), nullptr);
+  GstPad *pad = gst_ghost_pad_new_from_template (kRequested,
+      pad_of (state_in<Self> (self).coded.log, "sink").get (), templ);
   gst_pad_set_active (pad, TRUE);
   gst_element_add_pad (self, pad);
-  const ObjectLock lock (self);
-  return state.requested = pad;
+  return pad;
 }
 
 /* A bin that is disposed of has no elements any more. */
 void
 release_pad (GstElement *self, GstPad *pad) noexcept
 {
-  auto &state = state_in<Self> (self);
   gst_element_remove_pad (self, pad);
   if (GST_BIN_NUMCHILDREN (self) > 0)
-    gst_ghost_pad_set_target (
-        GST_GHOST_PAD (state.sink), pad_of (state.coded.log, "sink").get ());
-  const ObjectLock lock (self);
-  state.requested = nullptr;
+    gst_ghost_pad_set_target (GST_GHOST_PAD (pad_of (self, "sink").get ()),
+        pad_of (state_in<Self> (self).coded.log, "sink").get ());
 }
 
 StructurePtr
@@ -516,7 +506,7 @@ set_up_instance (Self *self)
           GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM |
           GST_PAD_PROBE_TYPE_EVENT_FLUSH | GST_PAD_PROBE_TYPE_QUERY_DOWNSTREAM),
       on_input, self, nullptr);
-  state.sink = add_ghost_pad (GST_ELEMENT (self), "sink", state.coded.log);
+  add_ghost_pad (GST_ELEMENT (self), "sink", state.coded.log);
   gst_pad_set_event_function (
       add_ghost_pad (GST_ELEMENT (self), "src", state.mux), src_event);
 }

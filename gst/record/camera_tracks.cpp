@@ -20,16 +20,6 @@ namespace codedexposure::gst
 namespace
 {
 
-/* The demuxer knows these only since GStreamer 1.26. */
-CapsPtr
-deep_caps_of (Extent size)
-{
-  GstVideoInfo info;
-  gst_video_info_set_format (&info, GST_VIDEO_FORMAT_GRAY16_LE,
-      guint (size.width), guint (size.height));
-  return CapsPtr (gst_video_info_to_caps (&info));
-}
-
 bool
 is_aligned (GstBuffer *frame)
 {
@@ -49,13 +39,9 @@ aligned (GstBuffer *frame)
 {
   if (is_aligned (frame))
     return frame;
-  GstBuffer *copy =
-      gst_buffer_new_allocate (nullptr, gst_buffer_get_size (frame), nullptr);
-  GstMapInfo map;
-  gst_buffer_map (copy, &map, GST_MAP_WRITE);
-  gst_buffer_extract (frame, 0, map.data, map.size);
-  gst_buffer_unmap (copy, &map);
-  gst_buffer_copy_into (copy, frame, GST_BUFFER_COPY_METADATA, 0, -1);
+  constexpr auto kInOnePiece = GstBufferCopyFlags (
+      GST_BUFFER_COPY_ALL | GST_BUFFER_COPY_MERGE | GST_BUFFER_COPY_DEEP);
+  GstBuffer *copy = gst_buffer_copy_region (frame, kInOnePiece, 0, gsize (-1));
   gst_buffer_unref (frame);
   return copy;
 }
@@ -125,7 +111,8 @@ on_raw_frame (GstPad *, GstPadProbeInfo *info, gpointer pixels) noexcept
                                           : GST_PAD_PROBE_OK;
 }
 
-/* False: their format is none of coded frames. */
+/* False: their format is none of coded frames. The demuxer knows 16-bit grey
+ * only since GStreamer 1.26. */
 bool
 CameraTracks::take_raw (
     GstPad *pad, const GstCaps *caps, const FrameReading &how)
@@ -141,10 +128,11 @@ CameraTracks::take_raw (
   }
   if (how.pixel_bytes != 2 || how.size.width < 1 || how.size.height < 1)
     return false;
-  deep_.caps = deep_caps_of (how.size);
   GstVideoInfo info;
-  gst_video_info_from_caps (&info, deep_.caps.get ());
-  deep_.frame_bytes = GST_VIDEO_INFO_SIZE (&info);
+  gst_video_info_set_format (&info, GST_VIDEO_FORMAT_GRAY16_LE,
+      guint (how.size.width), guint (how.size.height));
+  deep_ = {
+      CapsPtr (gst_video_info_to_caps (&info)), GST_VIDEO_INFO_SIZE (&info)};
   gst_pad_add_probe (pad,
       GstPadProbeType (
           GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM),

@@ -265,7 +265,6 @@ CameraTracks::make_decoder (
 void
 CameraTracks::add_frames (GstPad *pad, const FrameReading &how)
 {
-  constexpr guint64 kNoLimit = 0;
   const CapsPtr caps (gst_pad_query_caps (pad, nullptr));
   if (!make_decoder (pad, caps.get (), how))
     return;
@@ -273,9 +272,7 @@ CameraTracks::add_frames (GstPad *pad, const FrameReading &how)
   if (duration_ > 0)
     gst_pad_add_probe (
         pad, GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, on_caps, this, nullptr);
-  queue_ = gst_element_factory_make ("queue", nullptr);
-  g_object_set (queue_, "max-size-buffers", PartnerInput::kQueued,
-      "max-size-bytes", 0u, "max-size-time", kNoLimit, nullptr);
+  queue_ = make_queue (PartnerInput::kQueued);
   gst_bin_add (GST_BIN (element_), queue_);
   if (decoder_) {
     gst_element_link_pads (decoder_, "src", restore (), "sink");

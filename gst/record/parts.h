@@ -53,6 +53,16 @@ make_part (GType type)
   return GST_ELEMENT (g_object_new (type, nullptr));
 }
 
+/** A queue for so many @p buffers, whatever their size; 0: for any number. */
+inline GstElement *
+make_queue (guint buffers)
+{
+  GstElement *queue = gst_element_factory_make ("queue", nullptr);
+  g_object_set (queue, "max-size-buffers", buffers, "max-size-bytes", 0u,
+      "max-size-time", guint64 (0), nullptr);
+  return queue;
+}
+
 /** Stops @p part of @p bin, which then has it no longer; null: does nothing. */
 inline void
 remove_part (GstElement *bin, GstElement *&part)

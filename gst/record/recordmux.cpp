@@ -156,23 +156,12 @@ link_frames (const Branch &branch, GstPad *sink)
 /* Frames are hashed and encoded in two threads. Lines are much smaller, and the
  * muxer waits for their frames. */
 void
-set_up_queues (const Branch &branch)
-{
-  constexpr guint64 kNoLimit = 0;
-  g_object_set (branch.frames, "max-size-buffers", 2u, "max-size-bytes", 0u,
-      "max-size-time", kNoLimit, nullptr);
-  g_object_set (branch.lines, "max-size-buffers", 0u, "max-size-bytes", 0u,
-      "max-size-time", kNoLimit, nullptr);
-}
-
-void
 add_branch (GstElement *self, Branch &branch)
 {
   const auto &state = state_in<Self> (self);
   branch.log = make_part (gst_coded_exposure_log_get_type ());
-  branch.frames = gst_element_factory_make ("queue", nullptr);
-  branch.lines = gst_element_factory_make ("queue", nullptr);
-  set_up_queues (branch);
+  branch.frames = make_queue (2);
+  branch.lines = make_queue (0);
   gst_bin_add_many (
       GST_BIN (self), branch.log, branch.frames, branch.lines, nullptr);
   gst_element_link_pads (branch.log, "src", branch.frames, "sink");

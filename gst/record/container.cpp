@@ -2,13 +2,12 @@
 #include "container.h"
 
 #include <algorithm>
-#include <bit>
-#include <cstdint>
 #include <string>
 #include <string_view>
 #include <utility>
 
 #include "common/raii.h"
+#include "record/ebml.h"
 #include "record/matroska.h"
 
 namespace codedexposure::gst
@@ -20,8 +19,7 @@ namespace
 using namespace std::string_view_literals;
 
 /* Names of elements of Matroska (RFC 9559). */
-constexpr auto kCluster = "\x1f\x43\xb6\x75"sv, kTags = "\x12\x54\xc3\x67"sv,
-               kTagString = "\x44\x87"sv;
+constexpr auto kTags = "\x12\x54\xc3\x67"sv, kTagString = "\x44\x87"sv;
 
 /* The name "Subtitle" is as long as a shorter one with FlagDefault 0. */
 constexpr std::pair<std::string_view, std::string_view> kRewritten[] = {
@@ -41,24 +39,20 @@ bytes_of (GstBuffer *buffer, gsize most)
 void
 make_texts_plain (std::string &bytes)
 {
-  constexpr std::size_t kLongestLength = 8;
   for (auto at = bytes.find (kTagString); at != bytes.npos;
        at = bytes.find (kTagString, at + kTagString.size ())) {
-    const auto first = std::uint8_t (bytes.c_str ()[at + kTagString.size ()]);
-    const std::size_t digits = std::size_t (std::countl_zero (first)) + 1;
-    const std::size_t begin = at + kTagString.size () + digits;
-    if (digits > kLongestLength || begin >= bytes.size ())
+    const auto text =
+        ebml::Source::of (bytes).element_at (at, ebml::kUnlimited);
+    if (!text)
       continue;
-    std::size_t length = first & (0xffU >> digits);
-    for (std::size_t i = begin - digits + 1; i < begin; i++)
-      length = length << 8 | std::uint8_t (bytes[i]);
-    const auto quoted = std::string_view (bytes).substr (begin, length);
+    const auto quoted =
+        std::string_view (bytes).substr (text->data, text->end - text->data);
     const auto end = quoted.find_last_not_of ('\0');
     auto plain = unquoted_tag (quoted.substr (0, end + 1));
     if (!plain)
       continue;
     plain->resize (quoted.size (), '\0');
-    bytes.replace (begin, plain->size (), *plain);
+    bytes.replace (text->data, plain->size (), *plain);
   }
 }
 
@@ -134,7 +128,7 @@ ContainerOutput::rewrite (GstPadProbeInfo *info)
   }
   GstBuffer *buffer = GST_PAD_PROBE_INFO_BUFFER (info);
   const std::string begin = bytes_of (buffer, kTags.size ());
-  has_frames_ |= begin == kCluster;
+  has_frames_ |= begin == ebml::kClusterName;
   has_tags_ |= has_frames_ && begin == kTags &&
                gst_buffer_get_size (buffer) == kMasterSize;
   if (!has_frames_)

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <initializer_list>
 #include <numeric>
 #include <optional>
 
@@ -188,17 +187,6 @@ scale_structure (GstStructure *structure, const CapsScale &scale)
          scale_field (structure, "pixel-aspect-ratio", aspect);
 }
 
-CapsPtr
-without (GstCaps *caps, std::initializer_list<const char *> fields)
-{
-  CapsPtr free (gst_caps_copy (caps));
-  for (guint i = 0; i < gst_caps_get_size (free.get ()); i++)
-    for (const char *field : fields)
-      gst_structure_remove_field (
-          gst_caps_get_structure (free.get (), i), field);
-  return free;
-}
-
 bool
 has_rate (const GstStructure *structure)
 {
@@ -245,15 +233,20 @@ scale_caps (GstCaps *caps, const CapsScale &scale)
 }
 
 CapsPtr
-unbind_size (GstCaps *caps)
+without_fields (GstCaps *caps, std::initializer_list<const char *> fields)
 {
-  return without (caps, {"width", "height"});
+  CapsPtr free (gst_caps_copy (caps));
+  for (guint i = 0; i < gst_caps_get_size (free.get ()); i++)
+    for (const char *field : fields)
+      gst_structure_remove_field (
+          gst_caps_get_structure (free.get (), i), field);
+  return free;
 }
 
 CapsPtr
 unbind_caps (GstCaps *caps)
 {
-  return without (caps,
+  return without_fields (caps,
       {"framerate", "max-framerate", "width", "height", "pixel-aspect-ratio"});
 }
 

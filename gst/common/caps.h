@@ -2,6 +2,8 @@
 /* Converts caps between coded frames and subframes. */
 #pragma once
 
+#include <initializer_list>
+
 #include <gst/gst.h>
 #include <gst/video/video.h>
 
@@ -46,10 +48,11 @@ CapsScale coded_to_subframes (const Schedule &schedule, bool raised_rate);
  */
 GstCaps *scale_caps (GstCaps *caps, const CapsScale &scale);
 
+/** @p caps without these fields. */
+CapsPtr without_fields (
+    GstCaps *caps, std::initializer_list<const char *> fields);
 /** @p caps without the fields that a schedule changes. */
 CapsPtr unbind_caps (GstCaps *caps);
-/** @p caps without the size, which a mapping changes. */
-CapsPtr unbind_size (GstCaps *caps);
 /** In the order of @p preferred. */
 CapsPtr intersect_caps (GstCaps *preferred, GstCaps *other);
 

@@ -410,7 +410,8 @@ CodedFilter::convert_caps (const CapsContext &context, const GstCodedPad *pad,
     return unbind_caps (caps);
   const CapsScale scale = scale_for (*context.schedule, pad);
   CapsPtr scaled (scale_caps (caps, to_coded ? scale.inverse () : scale));
-  return context.mapped ? unbind_size (scaled.get ()) : std::move (scaled);
+  return context.mapped ? without_fields (scaled.get (), {"width", "height"})
+                        : std::move (scaled);
 }
 
 /* A pad that is not linked restricts nothing: without a peer, the answer is

@@ -89,8 +89,10 @@ convert_region (const Schedule &schedule, int i, GstCaps *caps, bool to_coded)
   if (i >= int (schedule.regions ().size ()))
     return unbind_caps (caps);
   const CapsScale scale = coded_to_subframes (schedule.region (i), true);
-  if (to_coded)
-    return unbind_size (CapsPtr (scale_caps (caps, scale.inverse ())).get ());
+  if (to_coded) {
+    const CapsPtr scaled (scale_caps (caps, scale.inverse ()));
+    return without_fields (scaled.get (), {"width", "height"});
+  }
   const Rect &rect = schedule.regions ()[std::size_t (i)].rect;
   const CapsPtr cut (gst_caps_copy (caps));
   gst_caps_set_simple (cut.get (), "width", G_TYPE_INT, rect.width, "height",

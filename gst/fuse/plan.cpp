@@ -407,13 +407,8 @@ Fuse::convert_caps (const CapsContext &context, const GstCodedPad *pad,
   if (pad->state.kind != PadKind::uncertainty ||
       gst_caps_is_any (converted.get ()))
     return converted;
-  if (!to_coded)
-    return of_sixteen_bits (converted.get ());
-  CapsPtr any (gst_caps_make_writable (converted.release ()));
-  for (guint i = 0; i < gst_caps_get_size (any.get ()); i++)
-    gst_structure_remove_field (
-        gst_caps_get_structure (any.get (), i), "format");
-  return any;
+  return to_coded ? without_fields (converted.get (), {"format"})
+                  : of_sixteen_bits (converted.get ());
 }
 
 CapsScale

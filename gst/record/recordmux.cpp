@@ -306,12 +306,9 @@ change_of_video (const GstCaps *before, const GstCaps *after)
 
 /* Of coded frames, which are grey, it says nothing. */
 CapsPtr
-without_colorimetry (const GstCaps *caps)
+without_colorimetry (GstCaps *caps)
 {
-  CapsPtr copy (gst_caps_copy (caps));
-  gst_structure_remove_fields (gst_caps_get_structure (copy.get (), 0),
-      "colorimetry", "chroma-site", nullptr);
-  return copy;
+  return without_fields (caps, {"colorimetry", "chroma-site"});
 }
 
 /* What FFV1 cannot keep is kept raw. Caps that tell the muxer, which takes no

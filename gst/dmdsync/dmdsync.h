@@ -174,9 +174,6 @@ void note_end (GstDmdSync *self);
 /** Says it when frames come at another rate than that of the caps. */
 void watch_rate (GstDmdSync *self, GstClockTime time);
 
-/** The properties, and the end of the state. */
-void install_own_state (gpointer klass);
-
 /* What the properties name; false with an error on the bus. */
 bool read_schedule (GstDmdSync *self);
 /** After open_device (), whose DMD must be that of the profile. */

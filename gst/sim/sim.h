@@ -113,9 +113,6 @@ struct GstCodedExposureSim : Instance<GstVideoFilter, SimState> {
 
 inline constexpr auto &state = state_in<GstCodedExposureSim>;
 
-/** The properties, and the end of the state. */
-void install_own_state (gpointer klass);
-
 /* Negotiation. */
 GstCaps *transform_caps (GstBaseTransform *trans, GstPadDirection direction,
     GstCaps *caps, GstCaps *filter);

@@ -102,8 +102,4 @@ private:
   std::vector<std::byte> scratch_; ///< subframes that no pad wants
 };
 
-/** The names of the numbered pads that @p schedule allows, in a sentence; null:
- * any schedule. */
-std::string pads_text (PadKind kind, const Schedule *schedule);
-
 } // namespace codedexposure::gst::demux

@@ -55,11 +55,7 @@ struct FileState {
 struct GstCodedExposureFileSink : Instance<GstBaseSink, FileState> {
 };
 
-FileState &
-state_of (gpointer self)
-{
-  return state_in<GstCodedExposureFileSink> (self);
-}
+constexpr auto &state_of = state_in<GstCodedExposureFileSink>;
 
 void
 fail (GstBaseSink *sink, const Error &error)

@@ -56,11 +56,7 @@ struct PairState : Run {
 struct GstCodedExposurePair : Instance<GstAggregator, PairState> {
 };
 
-inline PairState &
-state (gpointer object)
-{
-  return state_in<GstCodedExposurePair> (object);
-}
+inline constexpr auto &state = state_in<GstCodedExposurePair>;
 
 inline GstAggregatorPad *
 sink (gpointer self, const char *name)

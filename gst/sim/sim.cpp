@@ -218,11 +218,7 @@ properties ()
   };
 }
 
-GstBaseTransformClass *
-parent (gpointer element)
-{
-  return parent_class<GstBaseTransformClass> (element);
-}
+constexpr auto &parent = parent_class<GstBaseTransformClass>;
 
 bool
 begin_run (GstElement *element)

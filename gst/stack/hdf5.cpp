@@ -17,12 +17,7 @@ namespace
 {
 
 /* The library is not made for threads. */
-std::mutex &
-library ()
-{
-  static std::mutex mutex;
-  return mutex;
-}
+std::mutex library;
 
 /* The reason of the system alone, if @text has one among its addresses and
  * sizes. */
@@ -277,7 +272,7 @@ Hdf5::Hdf5 (const std::string &path, const StackFormat &format)
 
 Hdf5::~Hdf5 ()
 {
-  const std::lock_guard lock (library ());
+  const std::lock_guard lock (library);
   columns_.clear ();
   file_.reset ();
 }
@@ -285,7 +280,7 @@ Hdf5::~Hdf5 ()
 void
 Hdf5::add_origin (const std::string &json)
 {
-  const std::lock_guard lock (library ());
+  const std::lock_guard lock (library);
   const char *text = json.c_str ();
   const auto picture = gint64 (pictures_);
   columns_[kOrigin].append (&text, 1);
@@ -299,7 +294,7 @@ void
 Hdf5::add (const StackRow &row, const guint8 *pixels, gsize stride)
 {
   constexpr std::size_t kFlush = 25;
-  const std::lock_guard lock (library ());
+  const std::lock_guard lock (library);
   const gsize length = gsize (format_.width) * gsize (format_.bytes);
   if (length != stride) {
     packed_.clear ();
@@ -336,7 +331,7 @@ Hdf5::flush ()
 void
 Hdf5::finish (bool whole)
 {
-  const std::lock_guard lock (library ());
+  const std::lock_guard lock (library);
   flush ();
   check (H5Adelete (file_, "status"));
   set_attribute (file_, "status", whole ? "complete" : kBrokenOff);
@@ -350,7 +345,7 @@ Hdf5::finish (bool whole)
 std::unique_ptr<StackFile>
 open_hdf5 (const std::string &path, const StackFormat &format)
 {
-  const std::lock_guard lock (library ());
+  const std::lock_guard lock (library);
   return std::make_unique<Hdf5> (path, format);
 }
 

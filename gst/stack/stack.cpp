@@ -87,11 +87,7 @@ constexpr Form kForms[] = {{".ome.tif", kTiff, "libtiff-dev"},
     {".ome.tiff", kTiff, "libtiff-dev"}, {".h5", kHdf5, "libhdf5-dev"},
     {".ome.zarr", kZarr, "libzstd-dev"}};
 
-Stack &
-state_of (gpointer self)
-{
-  return state_in<GstCodedExposureStack> (self);
-}
+constexpr auto &state_of = state_in<GstCodedExposureStack>;
 
 /* Its name without the ending of a file that is not finished. */
 std::string

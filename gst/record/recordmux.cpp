@@ -61,7 +61,6 @@
 #include "common/raii.h"
 #include "common/tag.h"
 #include "container.h"
-#include "ffv1_encoder.h"
 #include "muxer_input.h"
 #include "parts.h"
 
@@ -113,6 +112,54 @@ G_DEFINE_ENUM_TYPE (GstCodedExposureRecordCodec,
     {int (Codec::ffv1), "Lossless, about half of the data", "ffv1"},
     {int (Codec::raw), "Not compressed", "raw"},
     {int (Codec::copy), "As they come, encoded", "copy"});
+
+/* -------------------------------------------------------------- encoder -- */
+
+/* Pixels of the shorter side. */
+int
+shorter_side (const GstCaps *caps)
+{
+  int width = 0, height = 0;
+  gst_structure_get (gst_caps_get_structure (caps, 0), "width", G_TYPE_INT,
+      &width, "height", G_TYPE_INT, &height, nullptr);
+  return std::min (width, height);
+}
+
+/* Four slices are two rows of two, and pixels of a slice of one row or column
+ * are lost as well. */
+GstPadProbeReturn
+set_slices (GstPad *, GstPadProbeInfo *info, gpointer encoder) noexcept
+{
+  GstEvent *event = GST_PAD_PROBE_INFO_EVENT (info);
+  if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS)
+    g_object_set (
+        encoder, "slices", shorter_side (caps_of (event)) < 4 ? 1 : 4, nullptr);
+  return GST_PAD_PROBE_OK;
+}
+
+/* All of its frames can be decoded alone, and its bytes do not depend on
+ * @threads (0: one for each processor). Null: it is not installed. */
+GstElement *
+make_ffv1_encoder (guint threads)
+{
+  GstElement *encoder = gst_element_factory_make ("avenc_ffv1", nullptr);
+  if (!encoder)
+    return nullptr;
+  g_object_set (encoder, "gop-size", 1, nullptr);
+  gst_util_set_object_arg (G_OBJECT (encoder), "threads",
+      threads == 0 ? "auto" : std::to_string (threads).c_str ());
+  gst_pad_add_probe (pad_of (encoder, "sink").get (),
+      GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM, set_slices, encoder, nullptr);
+  return encoder;
+}
+
+/* Whether frames with these caps come out again: FFmpeg 5.1 loses the pixels of
+ * frames of one row or column. */
+bool
+ffv1_keeps (const GstCaps *caps)
+{
+  return shorter_side (caps) > 1;
+}
 
 /* ---------------------------------------------------------- inner muxer -- */
 

@@ -93,7 +93,6 @@
 #include "common/meta.h"
 #include "common/partner.h"
 #include "common/tag.h"
-#include "pair/instant.h"
 #include "pair/pair.h"
 
 GST_DEBUG_CATEGORY_STATIC (codedexposure_pair_debug);
@@ -111,6 +110,84 @@ constexpr guint64 kOutOfStep = 8;
 
 /* Beyond the latency, for a first camera that is silent. */
 constexpr GstClockTime kPatience = GST_SECOND;
+
+/* ---------------------------------------------------------------- times -- */
+
+GstSegment
+segment_at (GstAggregatorPad *pad)
+{
+  return locked (pad, [pad] { return pad->segment; });
+}
+
+/** As the frame's meta says, on the clock of both cameras, or before its zero
+ * if time runs backwards, and by its PTS, as running time. */
+struct Instant {
+  std::optional<GstClockTimeDiff> said, running;
+};
+
+Instant
+instant_of (GstAggregatorPad *pad, GstBuffer *frame)
+{
+  const auto known = [] (GstClockTime time) {
+    return GST_CLOCK_TIME_IS_VALID (time)
+               ? std::optional (GstClockTimeDiff (time))
+               : std::nullopt;
+  };
+  const GstSegment segment = segment_at (pad);
+  const auto meta = get_frame_meta (frame);
+  Instant instant{known (meta ? meta->exposure_start : GST_CLOCK_TIME_NONE),
+      known (running_time (segment, GST_BUFFER_PTS (frame)))};
+  if (instant.said && segment.rate < 0.0)
+    instant.said = -*instant.said;
+  return instant;
+}
+
+/* By how much @one is played later; none: it is not known. Recordings of both
+ * cameras may begin with different frames, so what was said comes first. */
+std::optional<GstClockTimeDiff>
+later_by (const Instant &one, const Instant &other)
+{
+  for (const auto member : {&Instant::said, &Instant::running})
+    if (one.*member && other.*member)
+      return *(one.*member) - *(other.*member);
+  return std::nullopt;
+}
+
+/* From one frame to the next. @info: of their caps. */
+GstClockTime
+period_of (const GstVideoInfo &info, GstBuffer *frame)
+{
+  if (info.fps_n > 0)
+    return gst_util_uint64_scale (GST_SECOND, info.fps_d, info.fps_n);
+  return GST_BUFFER_DURATION_IS_VALID (frame) ? GST_BUFFER_DURATION (frame)
+                                              : 40 * GST_MSECOND;
+}
+
+enum class Found { kPartner, kNone, kWait };
+
+/* Takes the partner of @coded, the next frame of @on, from @off, and the frames
+ * before it into @dropped. @slack: how far their times may differ. @late: no
+ * longer waits for it. */
+Found
+find_partner (GstAggregatorPad *on, GstAggregatorPad *off, GstBuffer *coded,
+    GstClockTimeDiff slack, bool late, BufferPtr &partner,
+    std::vector<BufferPtr> &dropped)
+{
+  const Instant start = instant_of (on, coded);
+  while (const BufferPtr next{gst_aggregator_pad_peek_buffer (off)}) {
+    const auto late_by = later_by (instant_of (off, next.get ()), start);
+    if (late_by && *late_by > slack)
+      return Found::kNone;
+    if (late_by && *late_by >= -slack) {
+      partner.reset (gst_aggregator_pad_pop_buffer (off));
+      return Found::kPartner;
+    }
+    dropped.emplace_back (gst_aggregator_pad_pop_buffer (off));
+  }
+  return late || gst_aggregator_pad_is_eos (off) ? Found::kNone : Found::kWait;
+}
+
+/* ------------------------------------------------------- whether it fits -- */
 
 /* Why a coded frame goes on alone, or how sure it is that it does not. */
 enum class Alone { no, surely_not, missing, damaged, other_exposure };

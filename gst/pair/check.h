@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* Whether the pixels of two buffers are of one exposure. */
+/* What the pixels of two buffers show: whether they are of one exposure, and
+ * whether the second camera has moved. */
 #pragma once
 
+#include <deque>
 #include <optional>
 
 #include <gst/video/video.h>
@@ -42,6 +44,27 @@ private:
   std::optional<PartnerWatch> watch_;
   std::optional<PartnerDrift> drift_; ///< none: masks are not of one period
   GstVideoInfo on_ = {}, off_ = {};
+};
+
+/** Says when the second camera has moved. */
+class DriftWatch
+{
+public:
+  /** Of other streams, or after a gap in them. */
+  void reset () { *this = {}; }
+  /** Whether the pair at @p pts is to be measured: one a second is. */
+  bool is_due (GstClockTime pts);
+  /** The median of the last pairs; none: not known. */
+  std::optional<PartnerDrift::Shift> median () const;
+  /** Takes what the pair at @p pts shows; posts PartnerDrifted of @p element
+   * when the median begins or ceases to be too large. */
+  void take (gpointer element, GstClockTime pts,
+      const std::optional<PartnerDrift::Shift> &shift);
+
+private:
+  GstClockTime last_ = GST_CLOCK_TIME_NONE; ///< that was measured
+  std::deque<PartnerDrift::Shift> shifts_;
+  bool has_moved_ = false;
 };
 
 } // namespace codedexposure::gst

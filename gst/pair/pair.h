@@ -13,7 +13,6 @@
 #include "common/element.h"
 #include "common/raii.h"
 #include "pair/check.h"
-#include "pair/drift.h"
 
 namespace codedexposure::gst::pairs
 {

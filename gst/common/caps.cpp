@@ -2,7 +2,6 @@
 #include "caps.h"
 
 #include <algorithm>
-#include <cstdint>
 #include <numeric>
 #include <optional>
 

@@ -5,7 +5,6 @@
 #include <deque>
 #include <map>
 #include <mutex>
-#include <utility>
 
 namespace codedexposure::gst
 {

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "common/partner.h"
 
-#include <gst/video/video.h>
-
 namespace codedexposure::gst
 {
 

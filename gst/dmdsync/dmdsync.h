@@ -8,7 +8,6 @@
 #include <mutex>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include <gst/base/gstbasetransform.h>
 #include <gst/gst.h>

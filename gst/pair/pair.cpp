@@ -82,7 +82,6 @@
  *
  * Since: 0.2
  */
-#include <algorithm>
 #include <optional>
 #include <string>
 #include <vector>
@@ -92,7 +91,6 @@
 #include "common/elements.h"
 #include "common/meta.h"
 #include "common/partner.h"
-#include "common/tag.h"
 #include "pair/pair.h"
 
 GST_DEBUG_CATEGORY_STATIC (codedexposure_pair_debug);

@@ -37,7 +37,6 @@
  *
  * Since: 0.2
  */
-#include <algorithm>
 #include <optional>
 
 #include "base/pixels.h"

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "large_frames.h"
 
-#include <algorithm>
 #include <string>
 
 namespace codedexposure::gst

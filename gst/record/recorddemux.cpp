@@ -54,11 +54,9 @@
 #include <atomic>
 #include <memory>
 #include <string>
-#include <string_view>
 #include <utility>
 
 #include <gst/gst.h>
-#include <gst/video/video.h>
 
 #include "camera_tracks.h"
 #include "common/element.h"

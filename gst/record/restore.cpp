@@ -9,7 +9,6 @@
 #include <optional>
 #include <utility>
 #include <variant>
-#include <vector>
 
 #include <gst/gst.h>
 

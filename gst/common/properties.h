@@ -4,7 +4,6 @@
 #pragma once
 
 #include <functional>
-#include <initializer_list>
 #include <type_traits>
 #include <vector>
 
@@ -103,31 +102,9 @@ private:
 
 /** All properties of a class, in the order of their ids, which begin at 1. */
 template <typename State>
-class PropertyTable
-{
-public:
-  PropertyTable (std::initializer_list<Property<State>> properties)
-      : properties_ (properties)
-  {
-  }
+using PropertyTable = std::vector<Property<State>>;
 
-  /** Once: the class takes the specs. */
-  void install (GObjectClass *klass) const
-  {
-    guint id = 1;
-    for (const Property<State> &property : properties_)
-      g_object_class_install_property (klass, id++, property.spec ());
-  }
-  const Property<State> &operator[] (guint id) const
-  {
-    return properties_[id - 1];
-  }
-
-private:
-  std::vector<Property<State>> properties_;
-};
-
-/** The table that @p Table () makes, once. */
+/** The table that @p Table () makes, once: the class takes its specs. */
 template <auto Table>
 const auto &
 table_of ()
@@ -149,7 +126,7 @@ install_properties (GObjectClass *klass)
 {
   klass->set_property = [] (GObject *object, guint id, const GValue *value,
                             GParamSpec *pspec) noexcept {
-    const auto assign = table_of<Table> ()[id].read (value);
+    const auto assign = table_of<Table> ()[id - 1].read (value);
     const ObjectLock lock (object);
     if (!may_set (object, pspec))
       return;
@@ -159,9 +136,10 @@ install_properties (GObjectClass *klass)
   klass->get_property = [] (GObject *object, guint id, GValue *value,
                             GParamSpec *) noexcept {
     const ObjectLock lock (object);
-    table_of<Table> ()[id].get (StateOf (object), value);
+    table_of<Table> ()[id - 1].get (StateOf (object), value);
   };
-  table_of<Table> ().install (klass);
+  for (guint id = 1; const auto &property : table_of<Table> ())
+    g_object_class_install_property (klass, id++, property.spec ());
 }
 
 } // namespace codedexposure::gst

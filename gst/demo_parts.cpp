@@ -2,8 +2,8 @@
 /* The demo needs no more elements. */
 #include "parts.h"
 
-bool
+gboolean
 codedexposure::gst::register_more_elements (GstPlugin *)
 {
-  return true;
+  return TRUE;
 }

@@ -4,14 +4,14 @@
 #include "common/partner.h"
 #include "parts.h"
 
-bool
+gboolean
 codedexposure::gst::register_devices (GstPlugin *plugin)
 {
   register_meta (kFrameMetaName);
   register_partner_meta ();
 #ifdef CODEDEXPOSURE_ARAVIS
   if (!GST_DEVICE_PROVIDER_REGISTER (codedexposure_cameraprovider, plugin))
-    return false;
+    return FALSE;
 #endif
   return GST_ELEMENT_REGISTER (codedexposure_camerasrc, plugin) &&
          GST_ELEMENT_REGISTER (moirecalib, plugin);

@@ -3,12 +3,7 @@
  * and of drawing. */
 #include "parts.h"
 
-static gboolean
-plugin_init (GstPlugin *plugin)
-{
-  return codedexposure::gst::register_devices (plugin);
-}
-
 GST_PLUGIN_DEFINE (GST_VERSION_MAJOR, GST_VERSION_MINOR, codedexposuredevices,
     "Per-pixel coded exposure: cameras, and their calibration to the DMD",
-    plugin_init, PACKAGE_VERSION, "LGPL", PACKAGE, "Unknown package origin")
+    codedexposure::gst::register_devices, PACKAGE_VERSION, "LGPL", PACKAGE,
+    "Unknown package origin")

@@ -4,7 +4,7 @@
 #include "common/stats_report.h"
 #include "parts.h"
 
-bool
+gboolean
 codedexposure::gst::register_more_elements (GstPlugin *plugin)
 {
   register_meta (kStatsMetaName);

@@ -10,7 +10,7 @@ namespace codedexposure::gst
 
 /* dmdsync and the simulated bench share the mirrors of a process, so they are
  * in the same plugin. */
-bool
+gboolean
 register_elements (GstPlugin *plugin)
 {
   register_meta (kFrameMetaName);

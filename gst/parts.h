@@ -8,12 +8,12 @@ namespace codedexposure::gst
 {
 
 /** What records, decodes, simulates and shows. */
-bool register_elements (GstPlugin *plugin);
+gboolean register_elements (GstPlugin *plugin);
 
 /** What register_elements () adds for everybody but the demo. */
-bool register_more_elements (GstPlugin *plugin);
+gboolean register_more_elements (GstPlugin *plugin);
 
 /** Cameras and their calibration. */
-bool register_devices (GstPlugin *plugin);
+gboolean register_devices (GstPlugin *plugin);
 
 } // namespace codedexposure::gst

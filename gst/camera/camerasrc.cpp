@@ -201,11 +201,11 @@ send_event (GstElement *element, GstEvent *event)
       !as<GstCodedExposureCameraSrc> (element)->state.filter)
     return parent_class<GstElementClass> (element)->send_event (element, event);
   const auto push = [] (GstElement *source, gpointer end) {
-    auto *self = as<GstCodedExposureCameraSrc> (source);
-    camera::begin_end (self);
+    CameraState &st = camera::state (source);
+    locked (st.lock, [&st] { st.ending = true; });
     camera::stop_silent_camera (source);
-    gst_pad_push_event (pad_of (self->state.filter, "src").get (),
-        gst_event_ref (GST_EVENT (end)));
+    gst_pad_push_event (
+        pad_of (st.filter, "src").get (), gst_event_ref (GST_EVENT (end)));
   };
   gst_element_call_async (element, push, event,
       [] (gpointer end) { gst_event_unref (GST_EVENT (end)); });

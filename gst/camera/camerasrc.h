@@ -51,7 +51,7 @@ struct CameraState {
   std::condition_variable_any changed;
   ObjectPtr<GObject> camera;                    ///< of aravissrc, in this run
   std::chrono::steady_clock::time_point newest; ///< frame, or start of the run
-  bool ending = false;                          ///< EOS was sent
+  bool ending = false;   ///< EOS was sent: that aravissrc ends is no error
   bool watching = false; ///< errors may be ours to handle
   bool seen = false;     ///< a frame came in this run
   bool away = false;     ///< the camera failed, and no frame came since
@@ -90,8 +90,6 @@ void begin_watch (GstCodedExposureCameraSrc *self);
 void end_watch (GstElement *self);
 /** Whether the error @p message of a child is handled by a restart. */
 bool take_failure (GstCodedExposureCameraSrc *self, GstMessage *message);
-/** From now on, the end of aravissrc is no error. */
-void begin_end (GstCodedExposureCameraSrc *self);
 /** Makes a camera stop that has sent no complete frame for a second, where the
  * build has Aravis. aravissrc waits for one with its object locked, so that the
  * state of the pipeline cannot change. Its own end follows in two seconds. */
@@ -99,8 +97,6 @@ void stop_silent_camera (GstElement *self);
 /** Takes the camera of aravissrc, for stop_silent_camera (), or lets go of it:
  * it is controlled by the one who holds it. */
 void keep_camera (gpointer self, ObjectPtr<GObject> camera);
-/** Whether the camera is away. */
-bool is_away (GstCodedExposureCameraSrc *self);
 /** A frame came. @p silent  time since the one before. */
 void note_frame (GstCodedExposureCameraSrc *self, GstClockTime silent);
 

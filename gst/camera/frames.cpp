@@ -72,11 +72,12 @@ take_caps (GstCodedExposureCameraSrc *self, GstCaps *caps)
 bool
 passes (GstCodedExposureCameraSrc *self, GstPadProbeInfo *info)
 {
-  Stream &stream = state (self).stream;
+  CameraState &st = state (self);
+  Stream &stream = st.stream;
   GstEvent *event = GST_PAD_PROBE_INFO_EVENT (info);
   switch (GST_EVENT_TYPE (event)) {
   case GST_EVENT_EOS:
-    return !is_away (self);
+    return !locked (st.lock, [&st] { return st.away; });
   case GST_EVENT_STREAM_START:
     return !std::exchange (stream.started, true);
   case GST_EVENT_CAPS: {

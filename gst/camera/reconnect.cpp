@@ -203,14 +203,6 @@ take_failure (GstCodedExposureCameraSrc *self, GstMessage *message)
 }
 
 void
-begin_end (GstCodedExposureCameraSrc *self)
-{
-  CameraState &st = state (self);
-  const std::lock_guard guard (st.lock);
-  st.ending = true;
-}
-
-void
 keep_camera (gpointer self, ObjectPtr<GObject> camera)
 {
   CameraState &st = state (self);
@@ -234,14 +226,6 @@ stop_silent_camera (GstElement *self)
 #ifdef CODEDEXPOSURE_ARAVIS
   arv_camera_stop_acquisition (ARV_CAMERA (camera.get ()), nullptr);
 #endif
-}
-
-bool
-is_away (GstCodedExposureCameraSrc *self)
-{
-  CameraState &st = state (self);
-  const std::lock_guard guard (st.lock);
-  return st.away;
 }
 
 void

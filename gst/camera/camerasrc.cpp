@@ -221,14 +221,6 @@ set_clock (GstElement *element, GstClock *clock)
   return base->set_clock (element, clock);
 }
 
-} // namespace
-
-namespace codedexposure::gst::camera
-{
-
-namespace
-{
-
 /* Whether @found may be the camera of the bench profile, if there is one. */
 bool
 check_camera (GstCodedExposureCameraSrc *self, const Named<BenchProfile> &bench,
@@ -253,7 +245,59 @@ check_camera (GstCodedExposureCameraSrc *self, const Named<BenchProfile> &bench,
   return same.ok ();
 }
 
+void
+set_up (gpointer klass)
+{
+  auto *element_class = GST_ELEMENT_CLASS (klass);
+
+  GST_DEBUG_CATEGORY_INIT (camerasrc_debug, "codedexposure-camerasrc", 0,
+      "frames of a GenICam camera");
+  install_state<GstCodedExposureCameraSrc, properties> (klass);
+  describe_element (klass, "GenICam camera", "Source/Video/Hardware",
+      "Frames of a GenICam camera: aravissrc with trigger set-up, unpacked "
+      "pixels, memory of its own and reconnection",
+      {"src"});
+  install_run<kRun> (klass);
+  element_class->send_event = GST_DEBUG_FUNCPTR (send_event);
+  element_class->set_clock = GST_DEBUG_FUNCPTR (set_clock);
+  GST_BIN_CLASS (klass)->handle_message = GST_DEBUG_FUNCPTR (handle_message);
+}
+
+void
+set_up_instance (GstCodedExposureCameraSrc *self)
+{
+  CameraState &st = self->state;
+  GstPad *ghost = add_ghost_pad (GST_ELEMENT (self), "src", nullptr);
+  GST_OBJECT_FLAG_SET (self, GST_ELEMENT_FLAG_SOURCE);
+
+  GstElement *source = gst_element_factory_make ("aravissrc", "source");
+  GstElement *filter = gst_element_factory_make ("capsfilter", "format");
+  if (!source || !filter) {
+    gst_clear_object (&source);
+    gst_clear_object (&filter);
+    return;
+  }
+  gst_bin_add_many (GST_BIN (self), source, filter, nullptr);
+  gst_element_link (source, filter);
+  st.source = source;
+  st.filter = filter;
+  gst_ghost_pad_set_target (
+      GST_GHOST_PAD (ghost), pad_of (filter, "src").get ());
+  gst_pad_add_probe (pad_of (source, "src").get (),
+      GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER |
+                       GST_PAD_PROBE_TYPE_EVENT_BOTH |
+                       GST_PAD_PROBE_TYPE_QUERY_BOTH),
+      camera::take_item, self, nullptr);
+  gst_pad_add_probe (pad_of (filter, "sink").get (),
+      GstPadProbeType (
+          GST_PAD_PROBE_TYPE_QUERY_UPSTREAM | GST_PAD_PROBE_TYPE_PULL),
+      camera::take_answer, self, nullptr);
+}
+
 } // namespace
+
+namespace codedexposure::gst::camera
+{
 
 /* The name comes first: it makes aravissrc look for the camera, and forget the
  * one that it had, dead or alive. */
@@ -311,60 +355,6 @@ exposure_of_camera ([[maybe_unused]] GstCodedExposureCameraSrc *self)
 }
 
 } // namespace codedexposure::gst::camera
-
-namespace
-{
-
-void
-set_up (gpointer klass)
-{
-  auto *element_class = GST_ELEMENT_CLASS (klass);
-
-  GST_DEBUG_CATEGORY_INIT (camerasrc_debug, "codedexposure-camerasrc", 0,
-      "frames of a GenICam camera");
-  install_state<GstCodedExposureCameraSrc, properties> (klass);
-  describe_element (klass, "GenICam camera", "Source/Video/Hardware",
-      "Frames of a GenICam camera: aravissrc with trigger set-up, unpacked "
-      "pixels, memory of its own and reconnection",
-      {"src"});
-  install_run<kRun> (klass);
-  element_class->send_event = GST_DEBUG_FUNCPTR (send_event);
-  element_class->set_clock = GST_DEBUG_FUNCPTR (set_clock);
-  GST_BIN_CLASS (klass)->handle_message = GST_DEBUG_FUNCPTR (handle_message);
-}
-
-void
-set_up_instance (GstCodedExposureCameraSrc *self)
-{
-  CameraState &st = self->state;
-  GstPad *ghost = add_ghost_pad (GST_ELEMENT (self), "src", nullptr);
-  GST_OBJECT_FLAG_SET (self, GST_ELEMENT_FLAG_SOURCE);
-
-  GstElement *source = gst_element_factory_make ("aravissrc", "source");
-  GstElement *filter = gst_element_factory_make ("capsfilter", "format");
-  if (!source || !filter) {
-    gst_clear_object (&source);
-    gst_clear_object (&filter);
-    return;
-  }
-  gst_bin_add_many (GST_BIN (self), source, filter, nullptr);
-  gst_element_link (source, filter);
-  st.source = source;
-  st.filter = filter;
-  gst_ghost_pad_set_target (
-      GST_GHOST_PAD (ghost), pad_of (filter, "src").get ());
-  gst_pad_add_probe (pad_of (source, "src").get (),
-      GstPadProbeType (GST_PAD_PROBE_TYPE_BUFFER |
-                       GST_PAD_PROBE_TYPE_EVENT_BOTH |
-                       GST_PAD_PROBE_TYPE_QUERY_BOTH),
-      camera::take_item, self, nullptr);
-  gst_pad_add_probe (pad_of (filter, "sink").get (),
-      GstPadProbeType (
-          GST_PAD_PROBE_TYPE_QUERY_UPSTREAM | GST_PAD_PROBE_TYPE_PULL),
-      camera::take_answer, self, nullptr);
-}
-
-} // namespace
 
 GST_ELEMENT_REGISTER_DEFINE (codedexposure_camerasrc, "codedexposure-camerasrc",
     GST_RANK_NONE,

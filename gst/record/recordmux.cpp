@@ -60,8 +60,7 @@
 #include "common/elements.h"
 #include "common/raii.h"
 #include "common/tag.h"
-#include "container.h"
-#include "muxer_input.h"
+#include "muxer.h"
 #include "parts.h"
 
 using namespace codedexposure;
@@ -96,7 +95,7 @@ struct RecordMuxState {
   GstElement *mux = nullptr; ///< null: matroskamux is missing
   Branch coded, partner;
 
-  ContainerOutput output; ///< streaming thread
+  MuxerOutput output; ///< streaming thread
 
   /* Streaming thread of the sink pad, and changes of the state: */
   bool has_begun = false;   ///< a frame came: no track can be added

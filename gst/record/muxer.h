@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-/* What the inner muxer of codedexposure-recordmux gets of one camera. */
+/* What goes into the inner muxer of codedexposure-recordmux, and what comes out
+ * of it. */
 #pragma once
 
 #include <gst/gst.h>
@@ -24,6 +25,27 @@ struct MuxerInput {
   /** DTS of the last frame, and of the last line. */
   GstClockTime frame_order = GST_CLOCK_TIME_NONE;
   GstClockTime line_order = GST_CLOCK_TIME_NONE;
+};
+
+/**
+ * What the muxer gives, changed item by item for programs other than GStreamer.
+ * No byte moves in a file:
+ *
+ * - The head has the FourCC of FFmpeg for 16-bit grey, and a text track that is
+ *   not the default, so players do not show its lines on the pictures unasked;
+ *   so has the head in the caps of a stream, which late receivers get.
+ * - Texts of tags, which the muxer quotes and escapes, are plain.
+ */
+class MuxerOutput
+{
+public:
+  /** Before a run. */
+  void restart () { *this = {}; }
+  /** For a probe of buffers and downstream events at the muxer's source pad. */
+  void rewrite (GstPadProbeInfo *info);
+
+private:
+  bool has_frames_ = false, has_tags_ = false;
 };
 
 } // namespace codedexposure::gst

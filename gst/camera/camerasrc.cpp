@@ -52,11 +52,13 @@
 #include "camerasrc.h"
 
 #include <cmath>
+#include <string_view>
 
 #ifdef CODEDEXPOSURE_ARAVIS
 #include <arv.h>
 #endif
 
+#include "base/text.h"
 #include "common/elements.h"
 #include "common/properties.h"
 
@@ -140,6 +142,31 @@ properties ()
   };
 }
 
+/* An error that names the value, the rule and the remedy. */
+Result<void>
+check_settings (const Settings &settings)
+{
+  if (!settings.pixel_format.empty ())
+    if (const auto format = camera_format (settings.pixel_format); !format)
+      return format.error ();
+  if (settings.trigger_line.find_first_of (" =\t\n\"") != std::string::npos)
+    return Error{"trigger-line=\"" + settings.trigger_line +
+                 "\" is no line of a camera: it is one word, such as Line0. "
+                 "\"codedexposure camera show\" lists those of the camera"};
+  if (!settings.trigger_line.empty () && settings.trigger == Trigger::none)
+    return Error{"trigger-line=" + settings.trigger_line +
+                 " has no effect with trigger=none: set trigger=dmd where the "
+                 "DMD triggers the camera, trigger=camera where the camera "
+                 "triggers the DMD"};
+  for (const std::string_view word : split (settings.features, ' '))
+    if (word.starts_with ("PixelFormat="))
+      return Error{"features=\"" + std::string (word) +
+                   "\" does not say how to unpack the pixels: set "
+                   "pixel-format=" +
+                   std::string (word.substr (word.find ('=') + 1))};
+  return {};
+}
+
 /* What can be known before there is a camera. */
 bool
 check (GstElement *element)
@@ -219,6 +246,50 @@ set_clock (GstElement *element, GstClock *clock)
 {
   auto *base = GST_ELEMENT_CLASS (g_type_class_peek (GST_TYPE_ELEMENT));
   return base->set_clock (element, clock);
+}
+
+std::string
+line_of (const Settings &settings)
+{
+  if (!settings.trigger_line.empty ())
+    return settings.trigger_line;
+  return settings.trigger == Trigger::dmd ? "Line0" : "Line1";
+}
+
+/* Assignments in the order that a camera needs: a selector before what it
+ * selects, and the user's own last. Aravis makes them after it has set the
+ * frame rate, which ends all triggers. @settings: checked. */
+std::string
+feature_assignments (const Settings &settings)
+{
+  const bool falling = settings.trigger_edge == Edge::falling;
+  std::string text;
+  if (settings.trigger == Trigger::dmd)
+    text = "TriggerSelector=FrameStart TriggerSource=" + line_of (settings) +
+           " TriggerActivation=" + (falling ? "FallingEdge" : "RisingEdge") +
+           " TriggerMode=On";
+  else if (settings.trigger == Trigger::camera)
+    text = "TriggerSelector=FrameStart TriggerMode=Off LineSelector=" +
+           line_of (settings) +
+           " LineMode=Output LineSource=ExposureActive LineInverter=" +
+           (falling ? "true" : "false");
+  if (!settings.pixel_format.empty ())
+    text += " PixelFormat=" + std::string (mono_format_text (
+                                  *parse_mono_format (settings.pixel_format)));
+  if (!settings.features.empty ())
+    text += " " + settings.features;
+  return text;
+}
+
+/* Caps of the frames that come with a pixel format. */
+std::string
+caps_of_format (const std::string &pixel_format)
+{
+  const auto format = parse_mono_format (pixel_format);
+  return std::string ("video/x-raw,format=") +
+         (!format                           ? "{GRAY8,GRAY16_LE}"
+             : *format == MonoFormat::mono8 ? "GRAY8"
+                                            : "GRAY16_LE");
 }
 
 /* Whether @found may be the camera of the bench profile, if there is one. */

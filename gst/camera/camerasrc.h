@@ -12,15 +12,33 @@
 #include <gst/gst.h>
 
 #include "common/element.h"
+#include "common/named.h"
 #include "common/owned_frames.h"
 #include "common/raii.h"
-#include "settings.h"
+#include "setup/bench_profile.h"
 #include "sync/pause_watch.h"
 
 GST_DEBUG_CATEGORY_EXTERN (camerasrc_debug);
 
 namespace codedexposure::gst::camera
 {
+
+/** Which device starts an exposure. */
+enum class Trigger { none, dmd, camera };
+enum class Edge { rising, falling };
+
+struct Settings {
+  std::string name;         ///< as Aravis lists it; empty: the first one
+  std::string pixel_format; ///< GenICam name; empty: as the caps say
+  Trigger trigger = Trigger::none;
+  std::string trigger_line; ///< empty: Line0 for an input, Line1 for an output
+  Edge trigger_edge = Edge::rising;
+  double exposure_time = 0; ///< microseconds; 0: as the camera has it
+  std::string features;     ///< assignments beyond these
+  int num_buffers = -1;     ///< frames until EOS; -1: no end
+  unsigned reconnect = 0;   ///< tries to restart a camera that went away
+  Named<BenchProfile> bench;
+};
 
 /** One run, from READY to PAUSED and back. Streaming thread of aravissrc. */
 struct Stream {

@@ -24,12 +24,6 @@ constexpr std::size_t kMost = 8;
  */
 constexpr std::chrono::seconds kPatience (5);
 
-PartnerInput &
-input_of (GstPad *pad)
-{
-  return *static_cast<PartnerInput *> (gst_pad_get_element_private (pad));
-}
-
 } // namespace
 
 /* ------------------------------------------------------------------- pad -- */
@@ -44,10 +38,7 @@ PartnerInput::add_signal (gpointer klass)
 void
 PartnerInput::take_over (GstPad *pad)
 {
-  pad_ = pad;
-  gst_pad_set_element_private (pad, this);
-  gst_pad_set_chain_function (pad, chain);
-  gst_pad_set_event_function (pad, event);
+  PadBeside::take_over (pad);
   gst_pad_set_activatemode_function (pad, activate);
 }
 
@@ -56,7 +47,7 @@ gboolean
 PartnerInput::activate (
     GstPad *pad, GstObject *, GstPadMode, gboolean active) noexcept
 {
-  PartnerInput &self = input_of (pad);
+  PartnerInput &self = of (pad);
   locked (self.lock_, [&] { return self.is_flushing_ = !active; });
   self.moved_.notify_all ();
   return TRUE;
@@ -77,87 +68,80 @@ PartnerInput::frames_queued (
 /* ------------------------------------------------ thread of the partners -- */
 
 GstFlowReturn
-PartnerInput::chain (
-    GstPad *pad, GstObject *element, GstBuffer *buffer) noexcept
+PartnerInput::chain (GstObject *element, BufferPtr buffer)
 {
-  PartnerInput &self = input_of (pad);
-  BufferPtr owned (buffer);
-  std::unique_lock lock (self.lock_);
+  std::unique_lock lock (lock_);
   const auto is_left = [&] {
-    return self.segments_.own.count < self.segments_.frames.count;
+    return segments_.own.count < segments_.frames.count;
   };
   const auto has_room = [&] {
-    return self.partners_.size () < kMost || !self.is_wanted_ ||
-           self.is_flushing_ || is_left ();
+    return partners_.size () < kMost || !is_wanted_ || is_flushing_ ||
+           is_left ();
   };
   while (!has_room ()) {
-    if (!self.is_ahead_ && self.moved_.wait_for (lock, kPatience, has_room))
+    if (!is_ahead_ && moved_.wait_for (lock, kPatience, has_room))
       break;
-    self.is_ahead_ = self.frames_queued (lock, element) == 0;
-    if (self.is_ahead_ && !has_room ())
-      self.partners_.pop_front (); // its frame is missing
+    is_ahead_ = frames_queued (lock, element) == 0;
+    if (is_ahead_ && !has_room ())
+      partners_.pop_front (); // its frame is missing
   }
-  if (self.is_flushing_)
+  if (is_flushing_)
     return GST_FLOW_FLUSHING;
-  if (!self.is_wanted_ || !self.caps_ || is_left ())
+  if (!is_wanted_ || !caps_ || is_left ())
     return GST_FLOW_OK;
-  self.is_stalled_ = false;
-  self.moved_.notify_all ();
-  if (!self.is_off_beam_) {
-    self.has_ended_ = true; // none of them is a partner
+  is_stalled_ = false;
+  moved_.notify_all ();
+  if (!is_off_beam_) {
+    has_ended_ = true; // none of them is a partner
     return GST_FLOW_OK;
   }
-  self.partners_.push_back (
-      {{std::move (owned), CapsPtr (gst_caps_ref (self.caps_.get ()))},
-          self.segments_.own.count});
+  partners_.push_back (
+      {{std::move (buffer), CapsPtr (gst_caps_ref (caps_.get ()))},
+          segments_.own.count});
   return GST_FLOW_OK;
 }
 
-gboolean
-PartnerInput::event (GstPad *pad, GstObject *, GstEvent *owned) noexcept
+void
+PartnerInput::follow (GstEvent *event)
 {
-  PartnerInput &self = input_of (pad);
-  const EventPtr event (owned);
-  const std::lock_guard lock (self.lock_);
-  switch (GST_EVENT_TYPE (event.get ())) {
+  const std::lock_guard lock (lock_);
+  switch (GST_EVENT_TYPE (event)) {
   case GST_EVENT_STREAM_START:
-    self.has_ended_ = false;
+    has_ended_ = false;
     break;
   case GST_EVENT_CAPS:
-    self.caps_.reset (gst_caps_ref (caps_of (event.get ())));
+    caps_.reset (gst_caps_ref (caps_of (event)));
     break;
   case GST_EVENT_TAG:
-    if (const auto setup = setup_from_tags (tags_of (event.get ()));
-        setup && *setup) {
-      self.is_off_beam_ = setup->value ().off_beam;
-      self.has_ended_ = false;
+    if (const auto setup = setup_from_tags (tags_of (event)); setup && *setup) {
+      is_off_beam_ = setup->value ().off_beam;
+      has_ended_ = false;
     }
     break;
   case GST_EVENT_SEGMENT:
-    self.segments_.own.follow (event.get ());
+    segments_.own.follow (event);
     break;
   case GST_EVENT_CUSTOM_DOWNSTREAM_OOB:
-    if (const auto left = parse_event<SegmentLeft> (event.get ()))
-      self.left_[left->seqnum] = *left;
+    if (const auto left = parse_event<SegmentLeft> (event))
+      left_[left->seqnum] = *left;
     break;
   case GST_EVENT_EOS:
-    self.has_ended_ = true;
+    has_ended_ = true;
     break;
   case GST_EVENT_FLUSH_START:
-    self.is_flushing_ = true;
+    is_flushing_ = true;
     break;
   case GST_EVENT_FLUSH_STOP:
-    self.is_flushing_ = self.has_ended_ = false;
-    self.is_wanted_ = true;
-    self.partners_.clear ();
-    self.segments_.own = {};
-    self.left_.clear ();
+    is_flushing_ = has_ended_ = false;
+    is_wanted_ = true;
+    partners_.clear ();
+    segments_.own = {};
+    left_.clear ();
     break;
   default:
     break;
   }
-  self.moved_.notify_all ();
-  return TRUE;
+  moved_.notify_all ();
 }
 
 /* -------------------------------------------------- thread of the frames -- */

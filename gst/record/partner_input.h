@@ -20,7 +20,7 @@ namespace codedexposure::gst
 
 /** Partners come in a streaming thread of their own, which waits while some are
  * not taken. */
-class PartnerInput
+class PartnerInput : public PadBeside<PartnerInput>
 {
 public:
   /** Frames of a camera that a demuxer may read ahead. */
@@ -62,10 +62,9 @@ public:
   void end (GstElement *element);
 
 private:
-  static GstFlowReturn chain (
-      GstPad *pad, GstObject *parent, GstBuffer *buffer) noexcept;
-  static gboolean event (
-      GstPad *pad, GstObject *parent, GstEvent *event) noexcept;
+  friend PadBeside;
+  GstFlowReturn chain (GstObject *element, BufferPtr buffer);
+  void follow (GstEvent *event);
   static gboolean activate (GstPad *pad, GstObject *parent, GstPadMode mode,
       gboolean active) noexcept;
 
@@ -79,17 +78,15 @@ private:
   /** A seek left @p frame without its partner. */
   bool is_broken_off (GstBuffer *frame) const;
 
-  GstPad *pad_ = nullptr;
   AloneFrames alone_;
   bool is_other_said_ = false; ///< kOtherVideo
 
-  std::mutex lock_;               ///< of the rest; never held while pushing
+  /* The lock: */
   std::condition_variable moved_; ///< any of it
   struct Waiting : Partner {
     guint64 segment; ///< its number
   };
   std::deque<Waiting> partners_;
-  SegmentsBeside segments_;
   /** Segments that the demuxer has left, but the frames have not, by seqnum. */
   std::map<guint32, SegmentLeft> left_;
   CapsPtr caps_;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <mutex>
 
 #include <gst/gst.h>
 
@@ -68,6 +69,41 @@ struct SegmentsBeside {
   /** That both have reached. */
   guint64 reached () const { return std::min (own.count, frames.count); }
   bool is_ahead () const { return own.count > frames.count; }
+};
+
+/** Such a pad of the part restore, which a @p Derived is: it has chain () for
+ * buffers and follow () for events, in the streaming thread of the pad. */
+template <typename Derived>
+class PadBeside
+{
+public:
+  /** @p pad: of the element. */
+  void take_over (GstPad *pad)
+  {
+    pad_ = pad;
+    gst_pad_set_element_private (pad, static_cast<Derived *> (this));
+    gst_pad_set_chain_function (
+        pad, [] (GstPad *self, GstObject *element, GstBuffer *buffer) noexcept {
+          return of (self).chain (element, BufferPtr (buffer));
+        });
+    gst_pad_set_event_function (
+        pad, [] (GstPad *self, GstObject *, GstEvent *event) noexcept {
+          of (self).follow (EventPtr (event).get ());
+          return gboolean (TRUE);
+        });
+  }
+  /** Any thread. */
+  bool is_linked () const { return gst_pad_is_linked (pad_); }
+
+protected:
+  static Derived &of (GstPad *pad)
+  {
+    return *static_cast<Derived *> (gst_pad_get_element_private (pad));
+  }
+
+  GstPad *pad_ = nullptr;
+  std::mutex lock_; ///< of all that follows; never held while pushing
+  SegmentsBeside segments_;
 };
 
 /** Out of band, downstream: no further frame of a segment is read. A decoder

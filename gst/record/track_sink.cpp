@@ -9,17 +9,6 @@ GST_DEBUG_CATEGORY_EXTERN (codedexposure_restore_debug);
 namespace codedexposure::gst
 {
 
-namespace
-{
-
-TrackSink &
-sink_of (GstPad *pad)
-{
-  return *static_cast<TrackSink *> (gst_pad_get_element_private (pad));
-}
-
-} // namespace
-
 TrackReader::Order
 order_of (const GstSegment &segment)
 {
@@ -32,70 +21,52 @@ order_of (const GstSegment &segment)
                                  : TrackReader::Order::all;
 }
 
-/* ------------------------------------------------------------------- pad -- */
-
-void
-TrackSink::take_over (GstPad *pad)
-{
-  pad_ = pad;
-  gst_pad_set_element_private (pad, this);
-  gst_pad_set_chain_function (pad, chain);
-  gst_pad_set_event_function (pad, event);
-}
-
 /* --------------------------------------------------- thread of the track -- */
 
 GstFlowReturn
-TrackSink::chain (GstPad *pad, GstObject *, GstBuffer *buffer) noexcept
+TrackSink::chain (GstObject *, BufferPtr buffer)
 {
-  TrackSink &self = sink_of (pad);
-  const BufferPtr owned (buffer);
   GstMapInfo map;
-  if (!gst_buffer_map (buffer, &map, GST_MAP_READ))
+  if (!gst_buffer_map (buffer.get (), &map, GST_MAP_READ))
     return GST_FLOW_ERROR;
   const std::string text (reinterpret_cast<const char *> (map.data), map.size);
-  gst_buffer_unmap (buffer, &map);
+  gst_buffer_unmap (buffer.get (), &map);
 
   const auto time_of = [] (GstClockTime time) {
     return GST_CLOCK_TIME_IS_VALID (time) ? Nanoseconds (time) : 0;
   };
-  const std::lock_guard lock (self.lock_);
-  self.add (
-      {self.segments_.own.count, self.markup_ ? unescape_markup (text) : text,
-          time_of (GST_BUFFER_PTS (buffer)),
-          time_of (GST_BUFFER_DURATION (buffer))});
+  const std::lock_guard lock (lock_);
+  add ({segments_.own.count, markup_ ? unescape_markup (text) : text,
+      time_of (GST_BUFFER_PTS (buffer.get ())),
+      time_of (GST_BUFFER_DURATION (buffer.get ()))});
   return GST_FLOW_OK;
 }
 
-gboolean
-TrackSink::event (GstPad *pad, GstObject *, GstEvent *owned) noexcept
+void
+TrackSink::follow (GstEvent *event)
 {
-  TrackSink &self = sink_of (pad);
-  const EventPtr event (owned);
-  const std::lock_guard lock (self.lock_);
-  switch (GST_EVENT_TYPE (event.get ())) {
+  const std::lock_guard lock (lock_);
+  switch (GST_EVENT_TYPE (event)) {
   case GST_EVENT_CAPS: {
-    GstCaps *caps = caps_of (event.get ());
-    const GstStructure *structure = gst_caps_get_structure (caps, 0);
-    self.markup_ = g_strcmp0 (gst_structure_get_string (structure, "format"),
-                       "pango-markup") == 0;
+    const GstStructure *structure = gst_caps_get_structure (caps_of (event), 0);
+    markup_ = g_strcmp0 (gst_structure_get_string (structure, "format"),
+                  "pango-markup") == 0;
     break;
   }
   case GST_EVENT_SEGMENT:
-    self.reach (self.segments_.own, event.get ());
+    reach (segments_.own, event);
     break;
   case GST_EVENT_FLUSH_STOP:
-    self.reader_.clear ();
-    self.later_.clear ();
-    self.segments_.own = {};
+    reader_.clear ();
+    later_.clear ();
+    segments_.own = {};
     break;
   case GST_EVENT_EOS:
-    self.add ({self.segments_.own.count, std::nullopt});
+    add ({segments_.own.count, std::nullopt});
     break;
   default:
     break;
   }
-  return TRUE;
 }
 
 void

@@ -4,7 +4,6 @@
 
 #include <atomic>
 #include <deque>
-#include <mutex>
 #include <optional>
 #include <string>
 
@@ -22,15 +21,11 @@ TrackReader::Order order_of (const GstSegment &segment);
 
 /** Reads the lines that come on the track's streaming thread, plain or as Pango
  * markup, and gives each frame its line. */
-class TrackSink
+class TrackSink : public PadBeside<TrackSink>
 {
 public:
-  /** @p pad: of the element. */
-  void take_over (GstPad *pad);
-
   /* Any thread: */
 
-  bool is_linked () const { return gst_pad_is_linked (pad_); }
   /** Lines that could not be read since restart (). */
   guint64 damaged () const { return damaged_; }
 
@@ -61,10 +56,9 @@ public:
   }
 
 private:
-  static GstFlowReturn chain (
-      GstPad *pad, GstObject *parent, GstBuffer *buffer) noexcept;
-  static gboolean event (
-      GstPad *pad, GstObject *parent, GstEvent *event) noexcept;
+  friend PadBeside;
+  GstFlowReturn chain (GstObject *, BufferPtr buffer);
+  void follow (GstEvent *event);
   /** A line, or the end of the track. */
   struct Item {
     guint64 segment;
@@ -74,12 +68,10 @@ private:
   void add (Item item);
   void reach (SegmentCount &which, GstEvent *segment);
 
-  GstPad *pad_ = nullptr;
   std::atomic<guint64> damaged_ = 0;
 
-  std::mutex lock_; ///< of the rest; never held while pushing
+  /* The lock: */
   TrackReader reader_;
-  SegmentsBeside segments_;
   std::deque<Item> later_; ///< of segments that the frames have not reached
   bool markup_ = false;    ///< the text is escaped
 };

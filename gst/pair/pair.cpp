@@ -187,24 +187,11 @@ find_partner (GstAggregatorPad *on, GstAggregatorPad *off, GstBuffer *coded,
 
 /* ------------------------------------------------------- whether it fits -- */
 
-/* Why a coded frame goes on alone, or how sure it is that it does not. */
-enum class Alone { no, surely_not, missing, damaged, other_exposure };
-
-/* Null: it does not go alone. */
-const char *
-reason_of (Alone alone)
-{
-  switch (alone) {
-  case Alone::missing:
-    return "missing";
-  case Alone::damaged:
-    return "damaged";
-  case Alone::other_exposure:
-    return "other-exposure";
-  default:
-    return nullptr;
-  }
-}
+struct Judgement {
+  const char *alone = nullptr; ///< why a coded frame goes on alone; null: not
+  /* What its pixels and those of its partner show: */
+  bool is_confirmed = false, is_refused = false;
+};
 
 /* For the streams as they are. */
 PairCheck &
@@ -227,20 +214,6 @@ take_alone (GstCodedExposurePair *self, GstBuffer *frame, bool off)
     check_of (self).take_alone (frame, off);
 }
 
-/* What the pixels say of a pair. */
-Alone
-compare (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
-{
-  switch (check_of (self).check (coded, partner)) {
-  case PartnerWatch::Verdict::good:
-    return Alone::surely_not;
-  case PartnerWatch::Verdict::bad:
-    return Alone::other_exposure;
-  default:
-    return Alone::no;
-  }
-}
-
 void
 watch_drift (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
 {
@@ -252,28 +225,31 @@ watch_drift (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
   locked (self, [&] { st.shift = st.drift.median ().value_or (kUnknown); });
 }
 
-/* Why @coded goes on without @partner. */
-Alone
+Judgement
 judge (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
 {
+  using Verdict = PartnerWatch::Verdict;
   if (!partner) {
     take_alone (self, coded, false);
-    return Alone::missing;
+    return {"missing"};
   }
   if (is_corrupted (coded) || is_corrupted (partner))
-    return Alone::damaged;
+    return {"damaged"};
   if (shows_pattern (coded) || shows_pattern (partner)) {
     state (self).check.reset ();
-    return Alone::no;
+    return {};
   }
-  return compare (self, coded, partner);
+  const Verdict verdict = check_of (self).check (coded, partner);
+  if (verdict == Verdict::bad)
+    return {"other-exposure", false, true};
+  return {nullptr, verdict == Verdict::good};
 }
 
 void
-warn_if_out_of_step (GstCodedExposurePair *self, Alone alone)
+warn_if_out_of_step (GstCodedExposurePair *self, bool is_refused)
 {
   guint64 &refused = state (self).refused_in_a_row;
-  refused = alone == Alone::other_exposure ? refused + 1 : 0;
+  refused = is_refused ? refused + 1 : 0;
   if (refused == kOutOfStep)
     POST_WARNING (self, STREAM, FAILED,
         "The frames of the second camera are of other exposures than the coded "
@@ -283,18 +259,17 @@ warn_if_out_of_step (GstCodedExposurePair *self, Alone alone)
 }
 
 void
-count (GstCodedExposurePair *self, GstBuffer *coded, Alone alone)
+count (GstCodedExposurePair *self, GstBuffer *coded, const Judgement &judged)
 {
   PairState &st = state (self);
-  const char *reason = reason_of (alone);
   locked (self, [&] {
     Counters &counters = st.counters;
-    (reason ? counters.alone : counters.paired)++;
-    counters.confirmed += alone == Alone::surely_not;
-    counters.refused += alone == Alone::other_exposure;
+    (judged.alone ? counters.alone : counters.paired)++;
+    counters.confirmed += judged.is_confirmed;
+    counters.refused += judged.is_refused;
   });
-  st.alone.add (self, GST_BUFFER_PTS (coded), reason);
-  warn_if_out_of_step (self, alone);
+  st.alone.add (self, GST_BUFFER_PTS (coded), judged.alone);
+  warn_if_out_of_step (self, judged.is_refused);
 }
 
 /* Here caps and segment of the base class have passed. */
@@ -387,8 +362,8 @@ take_partner (
 GstFlowReturn
 push (GstCodedExposurePair *self, BufferPtr coded, BufferPtr partner)
 {
-  const Alone alone = judge (self, coded.get (), partner.get ());
-  if (!reason_of (alone)) {
+  const Judgement judged = judge (self, coded.get (), partner.get ());
+  if (!judged.alone) {
     if (!shows_pattern (coded.get ()))
       watch_drift (self, coded.get (), partner.get ());
     coded.reset (gst_buffer_make_writable (coded.release ()));
@@ -396,7 +371,7 @@ push (GstCodedExposurePair *self, BufferPtr coded, BufferPtr partner)
     set_partner (coded.get (),
         {std::move (partner), CapsPtr (caps ? gst_caps_ref (caps) : nullptr)});
   }
-  count (self, coded.get (), alone);
+  count (self, coded.get (), judged);
   auto *aggregator = GST_AGGREGATOR (self);
   auto *src = GST_AGGREGATOR_PAD (GST_AGGREGATOR_SRC_PAD (aggregator));
   locked (src,

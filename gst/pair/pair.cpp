@@ -84,7 +84,6 @@
  */
 #include <optional>
 #include <string>
-#include <vector>
 
 #include <gst/base/gstaggregator.h>
 
@@ -159,30 +158,6 @@ period_of (const GstVideoInfo &info, GstBuffer *frame)
     return gst_util_uint64_scale (GST_SECOND, info.fps_d, info.fps_n);
   return GST_BUFFER_DURATION_IS_VALID (frame) ? GST_BUFFER_DURATION (frame)
                                               : 40 * GST_MSECOND;
-}
-
-enum class Found { kPartner, kNone, kWait };
-
-/* Takes the partner of @coded, the next frame of @on, from @off, and the frames
- * before it into @dropped. @slack: how far their times may differ. @late: no
- * longer waits for it. */
-Found
-find_partner (GstAggregatorPad *on, GstAggregatorPad *off, GstBuffer *coded,
-    GstClockTimeDiff slack, bool late, BufferPtr &partner,
-    std::vector<BufferPtr> &dropped)
-{
-  const Instant start = instant_of (on, coded);
-  while (const BufferPtr next{gst_aggregator_pad_peek_buffer (off)}) {
-    const auto late_by = later_by (instant_of (off, next.get ()), start);
-    if (late_by && *late_by > slack)
-      return Found::kNone;
-    if (late_by && *late_by >= -slack) {
-      partner.reset (gst_aggregator_pad_pop_buffer (off));
-      return Found::kPartner;
-    }
-    dropped.emplace_back (gst_aggregator_pad_pop_buffer (off));
-  }
-  return late || gst_aggregator_pad_is_eos (off) ? Found::kNone : Found::kWait;
 }
 
 /* ------------------------------------------------------- whether it fits -- */
@@ -343,20 +318,37 @@ check_depth (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
   return false;
 }
 
-Found
-take_partner (
-    GstCodedExposurePair *self, GstBuffer *coded, bool late, BufferPtr &partner)
+/* A frame of the second camera that is no partner. */
+void
+drop_next (GstCodedExposurePair *self)
 {
-  PairState &st = state (self);
-  std::vector<BufferPtr> dropped;
-  const auto slack = GstClockTimeDiff (period_of (st.on.info, coded) / 4);
-  const Found found = find_partner (sink (self, "on"), sink (self, "off"),
-      coded, slack, late, partner, dropped);
-  locked (self, [&] { return st.counters.dropped += dropped.size (); });
-  for (const BufferPtr &frame : dropped)
-    if (frame)
-      take_alone (self, frame.get (), true);
-  return found;
+  const BufferPtr frame (gst_aggregator_pad_pop_buffer (sink (self, "off")));
+  if (!frame)
+    return;
+  locked (self, [&] { return ++state (self).counters.dropped; });
+  take_alone (self, frame.get (), true);
+}
+
+/* The partner of @coded, the next frame of the first camera; null: it has none.
+ * Nothing: it may still come, and is waited for unless it is @late. */
+std::optional<BufferPtr>
+take_partner (GstCodedExposurePair *self, GstBuffer *coded, bool late)
+{
+  GstAggregatorPad *off = sink (self, "off");
+  const Instant start = instant_of (sink (self, "on"), coded);
+  const auto slack =
+      GstClockTimeDiff (period_of (state (self).on.info, coded) / 4);
+  while (const BufferPtr next{gst_aggregator_pad_peek_buffer (off)}) {
+    const auto late_by = later_by (instant_of (off, next.get ()), start);
+    if (late_by && *late_by > slack)
+      return nullptr;
+    if (late_by && *late_by >= -slack)
+      return BufferPtr (gst_aggregator_pad_pop_buffer (off));
+    drop_next (self);
+  }
+  if (late || gst_aggregator_pad_is_eos (off))
+    return nullptr;
+  return std::nullopt;
 }
 
 GstFlowReturn
@@ -379,17 +371,6 @@ push (GstCodedExposurePair *self, BufferPtr coded, BufferPtr partner)
   return gst_aggregator_finish_buffer (aggregator, coded.release ());
 }
 
-/* The frames of the second camera that waited until now. */
-void
-drop_unwanted (GstCodedExposurePair *self)
-{
-  const BufferPtr frame (gst_aggregator_pad_pop_buffer (sink (self, "off")));
-  if (!frame)
-    return;
-  locked (self, [&] { return ++state (self).counters.dropped; });
-  take_alone (self, frame.get (), true);
-}
-
 GstFlowReturn
 aggregate (GstAggregator *aggregator, gboolean late)
 {
@@ -401,19 +382,18 @@ aggregate (GstAggregator *aggregator, gboolean late)
   const bool is_silent = state (self).is_silent;
   if (!head && !gst_aggregator_pad_is_eos (on)) {
     if (late && is_silent)
-      drop_unwanted (self);
+      drop_next (self); // it waited until now
     return GST_AGGREGATOR_FLOW_NEED_DATA;
   }
   if (!head)
     return end (self);
-  BufferPtr partner;
-  if (take_partner (self, head.get (), late && !is_silent, partner) ==
-      Found::kWait)
+  auto partner = take_partner (self, head.get (), late && !is_silent);
+  if (!partner)
     return GST_AGGREGATOR_FLOW_NEED_DATA;
-  if (partner && !check_depth (self, head.get (), partner.get ()))
+  if (*partner && !check_depth (self, head.get (), partner->get ()))
     return GST_FLOW_ERROR;
   BufferPtr coded (gst_aggregator_pad_pop_buffer (on));
-  return coded ? push (self, std::move (coded), std::move (partner))
+  return coded ? push (self, std::move (coded), *std::move (partner))
                : GST_AGGREGATOR_FLOW_NEED_DATA;
 }
 

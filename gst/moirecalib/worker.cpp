@@ -25,39 +25,15 @@ move_of (const StageCorrection &correction, const Pose &sigma)
       sigma.shift_x, sigma.shift_y, sigma.rotation, sigma.magnification};
 }
 
-void
-say_reading (GstMoireCalib *self, const Sample &sample,
-    const LiveReading &reading, const StageCorrection &correction)
-{
-  post_message (
-      self, MoireReading{{move_of (correction, reading.mapping.pose_sigma ())},
-                sample.number, sample.pts, stage_text (correction.state),
-                reading.contrast.x, reading.contrast.y, reading.coverage,
-                reading.saturated});
-}
-
-void
-say_phase (GstMoireCalib *self, const Sample &sample,
-    const CalibrationSession::Phase &found)
-{
-  const TilePhase &tile = found.tile;
-  post_message (
-      self, MoirePhase{sample.number, sample.pts, tile.phase.x, tile.phase.y,
-                tile.confidence, tile.contrast, found.schedule.text ()});
-}
-
 MoireMapping
-message_of (GstMoireCalib *self, const CalibrationResult &result,
-    const std::string &location, const std::string &report)
+message_of (const CalibrationResult &result, const StageCorrection &correction)
 {
   const auto pixels = [&result] (PixelQuality what) {
     return guint64 (result.pixels (what));
   };
   const Pose pose = result.mapping.pose ();
-  const StageCorrection correction =
-      correct_stage (result.mapping, settings_of (self).stage);
   return {{move_of (correction, result.mapping.pose_sigma ())},
-      result.mapping.to_json (), location, report, pose.shift_x, pose.shift_y,
+      result.mapping.to_json (), "", "", pose.shift_x, pose.shift_y,
       pose.stretch, result.psf_sigma, result.misfit,
       pixels (PixelQuality::good), pixels (PixelQuality::uncovered),
       pixels (PixelQuality::low_contrast), pixels (PixelQuality::saturated),
@@ -86,10 +62,7 @@ private:
   void solve ();
   void finish (const CalibrationResult &result);
   void finish_second ();
-  struct Written {
-    std::string location, report; ///< paths; empty: not written
-  };
-  Written write_files (CalibrationReport report, const Settings &settings,
+  MoireMapping write_files (CalibrationReport report, const Settings &settings,
       const std::string &location, const std::string &to);
   void fail (const std::string &why);
   void fail_of_memory ();
@@ -236,7 +209,11 @@ Worker::align (const Sample &sample)
   const auto &[reading, correction] = **alignment;
   correction_ = correction;
   /* The reading comes first, so that a state follows its reason. */
-  say_reading (self_, sample, reading, correction);
+  post_message (
+      self_, MoireReading{{move_of (correction, reading.mapping.pose_sigma ())},
+                 sample.number, sample.pts, stage_text (correction.state),
+                 reading.contrast.x, reading.contrast.y, reading.coverage,
+                 reading.saturated});
   set (correction.state);
   draw (stage_text (correction.state), alignment_lines (**alignment), {});
 }
@@ -313,7 +290,10 @@ Worker::find_phase (const Sample &sample)
     exchange_.found.due = true;
   }
   set (Stage::found);
-  say_phase (self_, sample, **found);
+  const auto &[tile, schedule] = **found;
+  post_message (
+      self_, MoirePhase{sample.number, sample.pts, tile.phase.x, tile.phase.y,
+                 tile.confidence, tile.contrast, schedule.text ()});
 }
 
 void
@@ -331,24 +311,25 @@ Worker::solve ()
     finish (**result);
 }
 
-/* @report: with the result. */
-Worker::Written
+/* @report: with the result. Returns the message of it, which names the files
+ * that were written. */
+MoireMapping
 Worker::write_files (CalibrationReport report, const Settings &settings,
     const std::string &location, const std::string &to)
 {
-  Written written;
   const CalibrationResult &result = *report.result;
+  const StageCorrection correction =
+      correct_stage (result.mapping, settings.stage);
+  MoireMapping message = message_of (result, correction);
   const auto take = [this] (const std::string &path, const Result<void> &done) {
     if (!done)
       POST_WARNING (self_, RESOURCE, WRITE, done.error ().message);
     return done ? path : "";
   };
   if (!location.empty ())
-    written.location = take (location, result.mapping.save (location));
+    message.location = take (location, result.mapping.save (location));
   if (to.empty ())
-    return written;
-  const StageCorrection correction =
-      correct_stage (result.mapping, settings.stage);
+    return message;
   const double tolerance = settings.stage.tolerance;
   report.verdict = alignment_verdict (correction, tolerance);
   report.within = correction.deviation <= tolerance;
@@ -358,8 +339,8 @@ Worker::write_files (CalibrationReport report, const Settings &settings,
     report.lines.push_back (
         "Fringes: from white to white is a displacement of " +
         std::to_string (live->period) + " mirrors");
-  written.report = take (to, write_report (to, report));
-  return written;
+  message.report = take (to, write_report (to, report));
+  return message;
 }
 
 /* Before that of the first camera, which ends the run. */
@@ -382,26 +363,26 @@ Worker::finish_second ()
   if (!*solved)
     return warn ("its frames cannot be read");
   const CalibrationResult &result = **solved;
-  const Written written = write_files (
+  const MoireMapping message = write_files (
       {.title = "Second camera against mirrors", .result = &result}, settings,
       settings.second_location, settings.second_report);
   locked (
       self_, [&] { state (self_).second_mapping = result.mapping.to_json (); });
   locked (exchange_.lock, [&] { exchange_.found.second = result.mapping; });
   g_object_notify (G_OBJECT (self_), "second-mapping");
-  post_message (self_, MoireSecondMapping{message_of (
-                           self_, result, written.location, written.report)});
+  post_message (self_, MoireSecondMapping{message});
 }
 
 void
 Worker::finish (const CalibrationResult &result)
 {
   const Settings settings = settings_of (self_);
-  const Written written = write_files ({.title = "Camera against mirrors",
-                                           .before = session_->first_fringes (),
-                                           .after = session_->last_fringes (),
-                                           .result = &result},
-      settings, settings.location, settings.report);
+  const MoireMapping message =
+      write_files ({.title = "Camera against mirrors",
+                       .before = session_->first_fringes (),
+                       .after = session_->last_fringes (),
+                       .result = &result},
+          settings, settings.location, settings.report);
   locked (self_, [&] { state (self_).mapping = result.mapping.to_json (); });
   locked (exchange_.lock, [&] {
     exchange_.found.mapping = result.mapping;
@@ -414,8 +395,7 @@ Worker::finish (const CalibrationResult &result)
   post_progress (self_, GST_PROGRESS_TYPE_COMPLETE, kMapping,
       "mapped with " + std::to_string (session_->collected ()) + " frames");
   g_object_notify (G_OBJECT (self_), "mapping");
-  post_message (
-      self_, message_of (self_, result, written.location, written.report));
+  post_message (self_, message);
 }
 
 /** The next one; the exchange's lock is held. Collected frames come first, and

@@ -9,27 +9,25 @@ namespace codedexposure::gst
 void
 AloneFrames::add (gpointer element, GstClockTime pts, const char *reason)
 {
-  if (!reason)
-    return close (element, pts);
-  if (frames_++ == 0) {
-    from_ = pts;
-    reason_ = reason;
+  if (!reason) {
+    if (open_)
+      open_->to = pts;
+    return end (element);
+  }
+  if (!open_) {
+    open_ = PartnerLost{.reason = reason, .frames = 0, .from = pts};
     post_message (
         element, PartnerLost{.active = true, .reason = reason, .from = pts});
   }
-  last_ = pts;
+  ++*open_->frames;
+  open_->to = pts;
 }
 
 void
-AloneFrames::close (gpointer element, GstClockTime to)
+AloneFrames::end (gpointer element)
 {
-  const guint64 frames = std::exchange (frames_, 0);
-  if (frames > 0)
-    post_message (element, PartnerLost{.active = false,
-                               .reason = reason_,
-                               .frames = frames,
-                               .from = from_,
-                               .to = to});
+  if (const auto over = std::exchange (open_, std::nullopt))
+    post_message (element, *over);
 }
 
 } // namespace codedexposure::gst

@@ -2,6 +2,8 @@
 /* Coded frames that go on without the partners they were to have. */
 #pragma once
 
+#include <optional>
+
 #include "messages.h"
 
 namespace codedexposure::gst
@@ -16,17 +18,14 @@ public:
    * has its partner. */
   void add (gpointer element, GstClockTime pts, const char *reason);
   /** No frame follows. */
-  void end (gpointer element) { close (element, last_); }
+  void end (gpointer element);
   /** After a flush. */
-  void forget () { frames_ = 0; }
+  void forget () { open_.reset (); }
 
 private:
-  void close (gpointer element, GstClockTime to);
-
-  guint64 frames_ = 0;      ///< in a row; 0: none
-  GstClockTime from_ = 0;   ///< PTS of the first
-  GstClockTime last_ = 0;   ///< PTS of the last
-  const char *reason_ = ""; ///< of the first
+  /** What is said at the end of the sequence, which goes on to the last frame.
+   */
+  std::optional<PartnerLost> open_;
 };
 
 } // namespace codedexposure::gst

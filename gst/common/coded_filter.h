@@ -346,13 +346,6 @@ protected:
 private:
   friend GType coded_filter_type ();
 
-  /** A sequence of saturated frames. */
-  struct Burst {
-    guint64 frames = 0;
-    guint64 peak = 0; ///< most saturated pixels in one of them
-    GstClockTime from = GST_CLOCK_TIME_NONE;
-    GstClockTime to = GST_CLOCK_TIME_NONE;
-  };
   /** Reused while its inputs are the same: weights take long to compute. */
   struct RectifierCache {
     Mapping mapping;
@@ -401,7 +394,8 @@ private:
     /** Until when upstream has said that frames are missing. */
     GstClockTime missing_until = 0;
     std::string pattern; ///< that was said of frames that are not decoded
-    Burst saturation;
+    /** What is said at the end of a sequence of saturated frames. */
+    std::optional<Saturated> saturation;
     std::optional<Schedule> overruled; ///< tagged, and reported as overruled
     bool warned_assumed = false;
     bool warned_of_time = false;

@@ -384,18 +384,21 @@ CodedFilter::note_saturation (const CodedFrame &frame)
       frame.place != Place::inside)
     return;
   const GstClockTime pts = frame.pts ();
-  Burst &burst = stream_.saturation;
+  std::optional<Saturated> &burst = stream_.saturation;
   if (frame.meta.saturated == 0) {
-    if (burst.frames > 0 && std::abs (GST_CLOCK_DIFF (burst.to, pts)) >= kCalm)
+    if (burst && std::abs (GST_CLOCK_DIFF (*burst->to, pts)) >= kCalm)
       end_saturation ();
     return;
   }
   count (&CodedCounters::saturated_frames);
-  burst.to = pts;
-  burst.peak = std::max (burst.peak, frame.meta.saturated);
-  if (burst.frames++ > 0)
+  const bool begins = !burst;
+  if (begins)
+    burst = Saturated{.frames = 0, .from = pts};
+  ++*burst->frames;
+  burst->to = pts;
+  burst->pixels = std::max (burst->pixels, frame.meta.saturated);
+  if (!begins)
     return;
-  burst.from = pts;
   post_message (element_, Saturated{.active = true,
                               .frame = frame.meta.frame,
                               .from = pts,
@@ -406,14 +409,10 @@ CodedFilter::note_saturation (const CodedFrame &frame)
 void
 CodedFilter::end_saturation ()
 {
-  const Burst burst = std::exchange (stream_.saturation, {});
-  if (burst.frames == 0)
+  const auto burst = std::exchange (stream_.saturation, std::nullopt);
+  if (!burst)
     return;
-  post_message (element_, Saturated{.active = false,
-                              .frames = burst.frames,
-                              .from = burst.from,
-                              .to = burst.to,
-                              .pixels = burst.peak});
+  post_message (element_, *burst);
   notify ("stats");
 }
 

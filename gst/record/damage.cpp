@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "common/excerpt.h"
-#include "common/messages.h"
 
 namespace codedexposure::gst
 {
@@ -31,24 +30,20 @@ DamageReport::frame_flagged (
     bool known, guint64 number, GstClockTime pts, const char *reason)
 {
   count (known ? &Counters::frames_damaged : &Counters::frames_unknown);
-  if (open_.count++ > 0)
-    return;
-  open_.frame = number;
-  open_.from = pts;
-  post_message (element_,
-      FramesDamaged{
-          .active = true, .frame = number, .from = pts, .reason = reason});
+  if (!open_) {
+    open_ = FramesDamaged{.frame = number, .count = 0, .from = pts};
+    post_message (element_,
+        FramesDamaged{
+            .active = true, .frame = number, .from = pts, .reason = reason});
+  }
+  ++*open_->count;
 }
 
 void
 DamageReport::end_sequence ()
 {
-  const Sequence over = std::exchange (open_, {});
-  if (over.count > 0)
-    post_message (element_, FramesDamaged{.active = false,
-                                .frame = over.frame,
-                                .count = over.count,
-                                .from = over.from});
+  if (const auto over = std::exchange (open_, std::nullopt))
+    post_message (element_, *over);
 }
 
 void

@@ -2,9 +2,11 @@
 /* What the part restore counts and says of damage. */
 #pragma once
 
+#include <optional>
+
 #include <gst/gst.h>
 
-#include "common/structure.h"
+#include "common/messages.h"
 #include "record/frame_record.h"
 
 namespace codedexposure::gst
@@ -22,7 +24,7 @@ public:
   /** Before a run. */
   void restart ();
   /** After a flush: no sequence of damaged frames is open. */
-  void forget () { open_ = {}; }
+  void forget () { open_.reset (); }
 
   /** Each frame, before the others. */
   void frame () { count (&Counters::frames); }
@@ -64,16 +66,13 @@ private:
     CODED_FIELDS (
         frames, frames_damaged, frames_unknown, frames_missing, lines_damaged);
   };
-  /** A sequence of frames that are not as recorded. */
-  struct Sequence {
-    guint64 frame = 0, count = 0;
-    GstClockTime from = 0;
-  };
   void count (guint64 Counters::*counter, guint64 by = 1);
 
   GstElement *element_;
   Counters counters_; ///< object lock
-  Sequence open_;
+  /** What is said at the end of a sequence of frames that are not as recorded.
+   */
+  std::optional<FramesDamaged> open_;
   guint64 repeated_ = 0;
 };
 

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "pair/check.h"
-
+/* codedexposure-pair: what the pixels of pairs show. */
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -8,9 +7,9 @@
 #include "base/pixels.h"
 #include "common/messages.h"
 #include "common/meta.h"
-#include "common/raii.h"
+#include "pair/pair.h"
 
-namespace codedexposure::gst
+namespace codedexposure::gst::pairs
 {
 
 namespace
@@ -164,4 +163,4 @@ DriftWatch::take (gpointer element, GstClockTime pts,
                              .from = pts});
 }
 
-} // namespace codedexposure::gst
+} // namespace codedexposure::gst::pairs

@@ -79,6 +79,30 @@ struct Geometry {
   Extent camera () const { return {info.width, info.height}; }
 };
 
+/** The mapping of a second camera, in the beam of the mirrors that are off,
+ * from the partners of the frames of the first. In the worker. */
+class SecondSession
+{
+public:
+  /** Beside a run of @p first, with @p settings. */
+  SecondSession (const Geometry &first, const Settings &settings)
+      : first_ (first), bits_ (settings.bits)
+  {
+  }
+
+  /** A frame of @p pattern, whose first one says the size of all. */
+  void collect (const Pattern &pattern, const Partner &partner);
+  /** None: no frame came. */
+  Result<std::optional<CalibrationResult>> solve ();
+
+private:
+  const Geometry first_;
+  const int bits_; ///< that were set; 0: as the frames say
+  std::optional<GstVideoInfo> info_;
+  std::optional<CalibrationSession> session_;
+  std::optional<Error> failure_; ///< the first one
+};
+
 /** What the worker has to do. */
 struct Queue {
   std::optional<Sample> live;

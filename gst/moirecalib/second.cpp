@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "second.h"
-
+/* moirecalib: the mapping of a second camera, while that of the first is
+ * measured. */
 #include "common/meta.h"
+#include "moirecalib.h"
 
 namespace codedexposure::gst::moire
 {

@@ -6,7 +6,7 @@
 #include <system_error>
 
 #include "common/messages.h"
-#include "second.h"
+#include "moirecalib.h"
 
 #define GST_CAT_DEFAULT moirecalib_debug
 

@@ -191,12 +191,8 @@ bool take_request (GstDmdSync *self, const PatternRequest &request);
 MirrorsAnswer describe_mirrors (GstDmdSync *self);
 /** Shows the schedule again. */
 void give_back (GstDmdSync *self, const char *reason);
-/** What a frame shows. */
-struct PatternSight {
-  bool coded = true;
-  std::string pattern = {}; ///< as in the frame meta
-};
-PatternSight look_for_pattern (GstDmdSync *self, GstBuffer *buffer,
+/** The pattern that a frame shows, as in its meta; empty: the schedule. */
+std::string look_for_pattern (GstDmdSync *self, GstBuffer *buffer,
     const FrameStep &step, GstClockTime pts);
 
 /* Negotiation and events. */

@@ -26,7 +26,7 @@ struct Frame {
   FrameStep step;
   GstClockTime pts;
   LockDecision phase;
-  PatternSight sight;
+  std::string pattern; ///< as in the frame meta
 };
 
 void
@@ -293,7 +293,7 @@ watch_phase (GstDmdSync *self, Frame &frame)
   SyncState &st = state (self);
   if (is_off_beam (self))
     return;
-  if (!frame.sight.coded) {
+  if (!frame.pattern.empty ()) {
     frame.phase.locked = false;
     return say_phase (self, frame);
   }
@@ -362,7 +362,7 @@ meta_of (GstDmdSync *self, const Frame &frame)
   meta.locked = frame.phase.locked;
   meta.slip = frame.phase.slip;
   meta.lost_before = frame.step.lost;
-  meta.pattern = frame.sight.pattern;
+  meta.pattern = frame.pattern;
   meta.time_uncertainty = stream.uncertainty;
   return meta;
 }
@@ -396,14 +396,14 @@ take_frame (GstDmdSync *self, BufferPtr buffer)
     flow = take_whole (self, frame);
   if (flow != GST_FLOW_OK)
     return flow;
-  frame.sight =
+  frame.pattern =
       look_for_pattern (self, frame.buffer.get (), frame.step, frame.pts);
   watch_phase (self, frame);
   if (too_early) {
     count (self, &Counters::frames_early);
     return drop (self, frame, "before-start");
   }
-  if (frame.phase.locked == false && frame.sight.coded)
+  if (frame.phase.locked == false && frame.pattern.empty ())
     if (flow = take_unlocked (self, frame); flow != GST_FLOW_OK)
       return flow;
 

@@ -159,7 +159,7 @@ give_back (GstDmdSync *self, const char *reason)
   post_message (self, PatternOver{*pattern, reason});
 }
 
-PatternSight
+std::string
 look_for_pattern (GstDmdSync *self, GstBuffer *buffer, const FrameStep &step,
     GstClockTime pts)
 {
@@ -178,7 +178,7 @@ look_for_pattern (GstDmdSync *self, GstBuffer *buffer, const FrameStep &step,
   const bool shown = stream.shown.take (st.runner->settled (),
       level_of (stream.time->info, buffer), step.lost > 0);
   if (!shown)
-    return {.coded = false, .pattern = kSwitch};
+    return kSwitch;
   if (!pattern) {
     stream.coded = true;
     begin_phase (self);
@@ -193,7 +193,7 @@ look_for_pattern (GstDmdSync *self, GstBuffer *buffer, const FrameStep &step,
                --st.pattern->frames_left == 0;
       }))
     give_back (self, "frames");
-  return {.coded = false, .pattern = pattern->text};
+  return pattern->text;
 }
 
 } // namespace codedexposure::gst::sync

@@ -134,13 +134,6 @@ refuse_settings (gpointer element, const std::string &why)
 }
 
 void
-post_latency (gpointer element)
-{
-  gst_element_post_message (
-      GST_ELEMENT (element), gst_message_new_latency (GST_OBJECT (element)));
-}
-
-void
 post_progress (gpointer element, GstProgressType type, const char *code,
     const std::string &text)
 {

@@ -186,8 +186,6 @@ GstFlowReturn refuse_buffer (
 bool counts_time (gpointer element, const GstSegment &segment);
 /** Posts an error of the settings. Returns false. */
 bool refuse_settings (gpointer element, const std::string &why);
-/** Posts that the latency has changed. */
-void post_latency (gpointer element);
 /** Sets @p own, the element's part of the latency, to what @p compute returns,
  * under the object lock, and posts it if it changes. */
 template <typename Compute>
@@ -198,7 +196,8 @@ set_latency (gpointer element, GstClockTime &own, Compute compute)
         const GstClockTime latency = compute ();
         return std::exchange (own, latency) != latency;
       }))
-    post_latency (element);
+    gst_element_post_message (
+        GST_ELEMENT (element), gst_message_new_latency (GST_OBJECT (element)));
 }
 void post_progress (gpointer element, GstProgressType type, const char *code,
     const std::string &text);

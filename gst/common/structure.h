@@ -155,20 +155,12 @@ from_structure (const GstStructure *structure)
                                         : std::nullopt;
 }
 
-/** An element message of @p source; Transfer: full. */
-template <typename T>
-GstMessage *
-new_message (gpointer source, const T &value)
-{
-  return gst_message_new_element (GST_OBJECT (source), to_structure (value));
-}
-
 template <typename T>
 void
 post_message (gpointer element, const T &value)
 {
-  gst_element_post_message (
-      GST_ELEMENT (element), new_message (element, value));
+  gst_element_post_message (GST_ELEMENT (element),
+      gst_message_new_element (GST_OBJECT (element), to_structure (value)));
 }
 
 /** None for another message. */

@@ -36,16 +36,6 @@ count (GstDmdSync *self, guint64 Counters::*counter, guint64 more = 1)
   state (self).counters.*counter += more;
 }
 
-/** A frame that was counted as lost has come. */
-void
-count_late (GstDmdSync *self)
-{
-  const ObjectLock lock (self);
-  Counters &counters = state (self).counters;
-  counters.frames_late++;
-  counters.frames_lost -= std::min<guint64> (counters.frames_lost, 1);
-}
-
 /** Posts that @p frame is dropped. Returns GST_BASE_TRANSFORM_FLOW_DROPPED. */
 GstFlowReturn
 drop (GstDmdSync *self, const Frame &frame, const char *reason)
@@ -177,7 +167,11 @@ take_arrival (GstDmdSync *self, const Frame &frame)
   case Arrival::after_loss:
     return take_loss (self, frame);
   case Arrival::late:
-    count_late (self);
+    locked (self, [&counters = state (self).counters] {
+      counters.frames_late++;
+      /* It was counted as one of these. */
+      counters.frames_lost -= std::min<guint64> (counters.frames_lost, 1);
+    });
     post_message (self, FrameLate{guint64 (frame.step.number), frame.pts});
     stream.discont = true;
     return GST_FLOW_OK;

@@ -207,15 +207,6 @@ begins_before (const GstSegment &segment, GstBuffer *frame)
              running_time (segment, GST_BUFFER_PTS (frame)));
 }
 
-bool
-has_times_of_recording (GstCodedExposureLog *self, const FrameRecord &record)
-{
-  const auto time = record.too_far ();
-  if (time)
-    POST_ERROR (self, STREAM, FORMAT, too_far_text (GstClockTime (*time)));
-  return !time;
-}
-
 GstFlowReturn
 transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
 {
@@ -230,8 +221,10 @@ transform_ip (GstBaseTransform *base, GstBuffer *frame) noexcept
   const int pilot = state.setup ? state.setup->schedule.pilot_rows () : 0;
   FrameRecord record =
       record_of (frame, state.info, base->segment, pilot, state.frames++);
-  if (!has_times_of_recording (self, record))
+  if (const auto time = record.too_far ()) {
+    POST_ERROR (self, STREAM, FORMAT, too_far_text (GstClockTime (*time)));
     return GST_FLOW_ERROR;
+  }
   count_lost (self, record);
   if (state.file.is_open () && !state.file.write (record.to_json ()))
     return GST_FLOW_ERROR;

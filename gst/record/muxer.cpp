@@ -80,14 +80,6 @@ keep_date (GstElement *mux, const GstTagList *tags)
   gst_date_time_unref (date);
 }
 
-void
-note_caps (MuxerInput &input, GstCaps *caps)
-{
-  input.raw = {};
-  if (!is_encoded (caps))
-    gst_video_info_from_caps (&input.raw, caps);
-}
-
 GstPadProbeReturn
 on_video (GstPad *pad, GstPadProbeInfo *info, gpointer input) noexcept
 {
@@ -98,7 +90,10 @@ on_video (GstPad *pad, GstPadProbeInfo *info, gpointer input) noexcept
                : GST_PAD_PROBE_OK;
   auto *event = GST_PAD_PROBE_INFO_EVENT (info);
   if (GST_EVENT_TYPE (event) == GST_EVENT_CAPS) {
-    note_caps (*static_cast<MuxerInput *> (input), caps_of (event));
+    GstVideoInfo &raw = static_cast<MuxerInput *> (input)->raw;
+    raw = {};
+    if (!is_encoded (caps_of (event)))
+      gst_video_info_from_caps (&raw, caps_of (event));
     info->data = rename_format (event);
   }
   if (GST_EVENT_TYPE (event) == GST_EVENT_TAG)

@@ -69,17 +69,17 @@ struct CameraState {
   std::condition_variable_any changed;
   ObjectPtr<GObject> camera;                    ///< of aravissrc, in this run
   std::chrono::steady_clock::time_point newest; ///< frame, or start of the run
-  bool ending = false;   ///< EOS was sent: that aravissrc ends is no error
-  bool watching = false; ///< errors may be ours to handle
-  bool seen = false;     ///< a frame came in this run
-  bool away = false;     ///< the camera failed, and no frame came since
-  bool failed = false;   ///< so did the last try
-  guint tries = 0;       ///< since it went away
-  guint most_tries = 0;  ///< before it is given up
-  std::string why;       ///< the last try failed
-  int frames_left = -1;  ///< until EOS; -1: no end
-  std::optional<PauseWatch> pauses; ///< during a run
-  std::jthread restarts;            ///< while the camera is away
+  bool ending = false;  ///< EOS was sent: that aravissrc ends is no error
+  bool seen = false;    ///< a frame came in this run
+  bool away = false;    ///< the camera failed, and no frame came since
+  bool failed = false;  ///< so did the last try
+  guint tries = 0;      ///< since it went away
+  guint most_tries = 0; ///< before it is given up
+  std::string why;      ///< the last try failed
+  int frames_left = -1; ///< until EOS; -1: no end
+  /** During a run, in which errors may be ours to handle. */
+  std::optional<PauseWatch> pauses;
+  std::jthread restarts; ///< while the camera is away
 };
 
 struct GstCodedExposureCameraSrc : Instance<GstBin, CameraState> {

@@ -136,7 +136,6 @@ begin_watch (GstCodedExposureCameraSrc *self)
   CameraState &st = state (self);
   const ObjectLock lock (self);
   const std::lock_guard guard (st.lock);
-  st.watching = true;
   st.most_tries = 0;
   st.pauses.emplace ();
   st.seen = st.away = st.failed = st.ending = false;
@@ -151,7 +150,6 @@ end_watch (GstElement *self)
   CameraState &st = state (self);
   std::jthread ended;
   locked (st.lock, [&] {
-    st.watching = false;
     st.pauses.reset ();
     ended = std::move (st.restarts);
   });
@@ -179,7 +177,7 @@ take_failure (GstCodedExposureCameraSrc *self, GstMessage *message)
     const guint tries = stopped.count () > 0
                             ? std::max (reconnect, kTriesAfterStop)
                             : reconnect;
-    if (!st.watching || (!st.away && !(own && st.seen && tries > 0)))
+    if (!st.pauses || (!st.away && !(own && st.seen && tries > 0)))
       return false;
     if (!st.away)
       st.most_tries = tries;
@@ -196,7 +194,7 @@ take_failure (GstCodedExposureCameraSrc *self, GstMessage *message)
   std::jthread before; // it has ended, or is about to
   const std::lock_guard guard (st.lock);
   before = std::move (st.restarts);
-  if (st.watching)
+  if (st.pauses)
     st.restarts = std::jthread (
         [self] (const std::stop_token &stop) { bring_back (self, stop); });
   return true;

@@ -58,7 +58,7 @@ void
 begin_anew (GstMoireCalib *self)
 {
   Stream &stream = state (self).stream;
-  stream.begun = false;
+  stream.turn.reset ();
   stream.asked.clear ();
 }
 
@@ -109,7 +109,6 @@ begin_run (GstMoireCalib *self, const Settings &settings, Geometry geometry)
     st.exchange.queue = {};
     st.exchange.progress = {};
   });
-  stream.begun = true;
   stream.turn = settings.turn;
   stream.mapping = false;
   set_stage (self, Stage::searching);
@@ -399,8 +398,7 @@ transform_ip (GstBaseTransform *trans, GstBuffer *buffer) noexcept
   if (!stream.info)
     return GST_FLOW_NOT_NEGOTIATED;
   const FrameMeta meta = get_frame_meta (buffer).value_or (FrameMeta ());
-  if ((!stream.begun || stream.turn != settings.turn) &&
-      !begin (self, settings, meta.bits))
+  if (stream.turn != settings.turn && !begin (self, settings, meta.bits))
     return GST_FLOW_ERROR;
 
   const std::string shown =

@@ -148,13 +148,12 @@ struct Exchange {
 struct Stream {
   std::optional<GstVideoInfo> info;
   std::optional<StreamSetup> setup; ///< from upstream
-  bool begun = false;
-  guint turn = 0;       ///< of the run
-  std::string asked;    ///< the requested pattern
-  bool mapping = false; ///< shows the patterns of a mapping
-  std::size_t next = 0; ///< pattern of the calibration
-  int taken = 0;        ///< frames of it
-  guint64 frames = 0;   ///< since the last request
+  std::optional<guint> turn; ///< of the run; none: the next frame begins one
+  std::string asked;         ///< the requested pattern
+  bool mapping = false;      ///< shows the patterns of a mapping
+  std::size_t next = 0;      ///< pattern of the calibration
+  int taken = 0;             ///< frames of it
+  guint64 frames = 0;        ///< since the last request
 };
 
 /** The object lock is never held while pushing, querying or posting. */

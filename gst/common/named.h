@@ -60,12 +60,7 @@ template <typename T>
 Named<T>
 read_again (gpointer element, Named<T> &named)
 {
-  std::string text;
-  {
-    const ObjectLock lock (element);
-    text = named.text;
-  }
-  Named<T> fresh (std::move (text));
+  Named<T> fresh (locked (element, [&named] { return named.text; }));
   const ObjectLock lock (element);
   return named = std::move (fresh);
 }

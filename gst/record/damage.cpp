@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "damage.h"
-
+/* The part restore: what it counts and says of damage. */
 #include <algorithm>
 #include <utility>
 
 #include "common/excerpt.h"
+#include "restore.h"
 
 namespace codedexposure::gst
 {

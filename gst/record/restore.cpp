@@ -18,7 +18,7 @@
 #include "common/record.h"
 #include "common/tag.h"
 #include "parts.h"
-#include "restore_state.h"
+#include "restore.h"
 
 using namespace codedexposure;
 using namespace codedexposure::gst;

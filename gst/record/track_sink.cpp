@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
-#include "track_sink.h"
-
+/* The part restore: the lines of the text track. */
 #include <utility>
+
+#include "restore.h"
 
 GST_DEBUG_CATEGORY_EXTERN (codedexposure_restore_debug);
 #define GST_CAT_DEFAULT codedexposure_restore_debug

@@ -6,17 +6,6 @@
 namespace codedexposure::gst
 {
 
-namespace
-{
-
-std::string
-name_of (GstVideoFormat format)
-{
-  return gst_video_format_to_string (format);
-}
-
-} // namespace
-
 Result<PartnerReader>
 PartnerReader::make (const PartnerSetup &partner, const CodedFormat &format,
     const RectifyOptions &options)
@@ -58,10 +47,9 @@ PartnerReader::read (
   const GstVideoFormat format = GST_VIDEO_INFO_FORMAT (&info);
   const Extent size{info.width, info.height};
   if (format != format_)
-    return Error{"it is " + name_of (format_) +
-                 ", but the frame of the second "
-                 "camera is " +
-                 name_of (format) +
+    return Error{std::string ("it is ") + gst_video_format_to_string (format_) +
+                 ", but the frame of the second camera is " +
+                 gst_video_format_to_string (format) +
                  "; set both cameras to the same pixel format"};
   if (!(size == size_))
     return Error{"the frame of the second camera has " + size_text (size) +

@@ -84,15 +84,6 @@ PartnerOutput::stand_in (GstCaps *caps) const
   return Partner{std::move (black), std::move (own)};
 }
 
-void
-PartnerOutput::begin_stream (GstElement *element)
-{
-  if (std::exchange (stream_sent_, true))
-    return;
-  const CharPtr id (gst_pad_create_stream_id (pad_, element, "partner"));
-  gst_pad_push_event (pad_, gst_event_new_stream_start (id.get ()));
-}
-
 guint64
 PartnerOutput::lost_before (GstBuffer *frame)
 {
@@ -129,7 +120,10 @@ PartnerOutput::push (GstElement *element, GstBuffer *frame, GstCaps *caps,
         "frames before they are recorded again.");
     return GST_FLOW_ERROR;
   }
-  begin_stream (element);
+  if (!std::exchange (stream_sent_, true)) {
+    const CharPtr id (gst_pad_create_stream_id (pad_, element, "partner"));
+    gst_pad_push_event (pad_, gst_event_new_stream_start (id.get ()));
+  }
   use_caps (partner->caps);
   if (!std::exchange (segment_sent_, true))
     gst_pad_push_event (pad_, gst_event_new_segment (&segment));

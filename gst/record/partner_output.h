@@ -40,7 +40,6 @@ public:
 
 private:
   std::optional<Partner> stand_in (GstCaps *caps) const;
-  void begin_stream (GstElement *element);
   void use_caps (const CapsPtr &caps);
 
   GstPad *pad_ = nullptr;

@@ -54,7 +54,6 @@ public:
 
 private:
   void begin (guint run);
-  void expect_grating ();
   void choose_schedule (std::optional<Schedule> &schedule);
   void find_phase (const Sample &sample);
   void align (const Sample &sample);
@@ -112,13 +111,8 @@ Worker::begin (guint run)
       .patterns = geometry_.patterns,
       .schedule = std::move (schedule),
       .off_beam = geometry_.off_beam});
-  if (geometry_.mode != Mode::phase)
-    expect_grating ();
-}
-
-void
-Worker::expect_grating ()
-{
+  if (geometry_.mode == Mode::phase)
+    return;
   const auto grating = Pattern::parse (settings_.live_pattern ());
   const auto expected = session_->expect (
       grating ? *grating : live_grating (), settings_.stage.pixels_per_mirror);

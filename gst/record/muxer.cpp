@@ -259,14 +259,6 @@ with_bytes (GstBuffer *buffer, const std::string &bytes)
 }
 
 GstBuffer *
-with_plain_texts (GstBuffer *buffer)
-{
-  std::string bytes = bytes_of (buffer, gsize (-1));
-  make_texts_plain (bytes);
-  return with_bytes (buffer, bytes);
-}
-
-GstBuffer *
 with_head_for_all (GstBuffer *buffer)
 {
   constexpr gsize kLongestHead = 8 << 20;
@@ -323,10 +315,13 @@ MuxerOutput::rewrite (GstPadProbeInfo *info)
   has_frames_ |= begin == ebml::kClusterName;
   has_tags_ |= has_frames_ && begin == kTags &&
                gst_buffer_get_size (buffer) == kMasterSize;
-  if (!has_frames_)
+  if (!has_frames_) {
     info->data = with_head_for_all (buffer);
-  else if (has_tags_)
-    info->data = with_plain_texts (buffer);
+  } else if (has_tags_) {
+    std::string bytes = bytes_of (buffer, gsize (-1));
+    make_texts_plain (bytes);
+    info->data = with_bytes (buffer, bytes);
+  }
 }
 
 } // namespace codedexposure::gst

@@ -152,14 +152,6 @@ make_ffv1_encoder (guint threads)
   return encoder;
 }
 
-/* Whether frames with these caps come out again: FFmpeg 5.1 loses the pixels of
- * frames of one row or column. */
-bool
-ffv1_keeps (const GstCaps *caps)
-{
-  return shorter_side (caps) > 1;
-}
-
 /* ---------------------------------------------------------- inner muxer -- */
 
 GstPadProbeReturn
@@ -357,7 +349,8 @@ without_colorimetry (GstCaps *caps)
   return without_fields (caps, {"colorimetry", "chroma-site"});
 }
 
-/* What FFV1 cannot keep is kept raw. Caps that tell the muxer, which takes no
+/* FFmpeg 5.1 loses the pixels of FFV1 frames of one row or column, which are
+ * kept raw. Caps that tell the muxer, which takes no
  * others, nothing new are dropped. */
 GstPadProbeReturn
 follow_caps (GstElement *self, GstEvent *event)
@@ -381,7 +374,7 @@ follow_caps (GstElement *self, GstEvent *event)
     POST_ERROR (self, STREAM, FORMAT,
         "The frames are encoded already. Set codec=copy to record them as they "
         "come, or decode them before this element.");
-  if (!state.has_begun && !ffv1_keeps (caps_of (event)))
+  if (!state.has_begun && shorter_side (caps_of (event)) < 2)
     end_encoder (self, branch);
   return GST_PAD_PROBE_OK;
 }

@@ -125,14 +125,6 @@ watch_mirrors (GstCodedExposureSim *self, const std::vector<int> &masks)
       ("this is posted once"));
 }
 
-/* The mask of a slot as one camera sees it. @parked: where no mirror is on. */
-int
-seen_mask (Stream &stream, std::int64_t slot, int parked)
-{
-  const int mask = stream.view->mask_in_slot (slot).value_or (parked);
-  return mask < 0 ? parked : mask;
-}
-
 /* The masks of all slots, at the start of the exposure, when the DMD begins to
  * step. */
 std::vector<int>
@@ -145,9 +137,10 @@ find_masks (GstCodedExposureSim *self, std::int64_t frame)
   std::vector<int> masks;
   for (int slot = 0; slot < slots; slot++) {
     const std::int64_t counted = frame * slots + slot;
-    masks.push_back (stream.mirrors
-                         ? seen_mask (stream, counted, parked)
-                         : int (counted % stream.schedule->masks ()));
+    const int mask = stream.mirrors
+                         ? stream.view->mask_in_slot (counted).value_or (parked)
+                         : int (counted % stream.schedule->masks ());
+    masks.push_back (mask < 0 ? parked : mask);
   }
   if (stream.beam == Beam::kOn)
     watch_mirrors (self, masks);

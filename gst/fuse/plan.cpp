@@ -257,13 +257,6 @@ gap_of (const CodedFormat &format)
          codedexposure::time_text (slots->active () / 4);
 }
 
-/* Rate times N, and the pilot's rows cropped. */
-CapsScale
-coded_to_fused (const Schedule &schedule)
-{
-  return {.rate = {schedule.slots ()}, .crop_rows = schedule.pilot_rows ()};
-}
-
 CapsPtr
 of_sixteen_bits (GstCaps *caps)
 {
@@ -343,7 +336,8 @@ Fuse::plan (const CodedFormat &format, PadCaps &caps)
                                 : CapsPtr (gst_caps_ref (format.caps.get ()));
   CapsPtr &fused = caps.of (PadKind::all);
   CapsPtr &uncertainty = caps.of (PadKind::uncertainty);
-  fused.reset (scale_caps (rectified.get (), coded_to_fused (format.schedule)));
+  fused.reset (
+      scale_caps (rectified.get (), scale_for (format.schedule, nullptr)));
   uncertainty = of_sixteen_bits (fused.get ());
   const int history =
       std::visit ([] (const auto &made) { return made.history (); }, *fuser);
@@ -414,7 +408,7 @@ Fuse::convert_caps (const CapsContext &context, const GstCodedPad *pad,
 CapsScale
 Fuse::scale_for (const Schedule &schedule, const GstCodedPad *) const
 {
-  return coded_to_fused (schedule);
+  return {.rate = {schedule.slots ()}, .crop_rows = schedule.pilot_rows ()};
 }
 
 } // namespace codedexposure::gst::fuse

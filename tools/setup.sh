@@ -28,6 +28,7 @@ libgstreamer1.0-dev|GStreamer core and its test harness|build
 libgstreamer-plugins-base1.0-dev|GStreamer video library|build
 nlohmann-json3-dev|reads and writes JSON (schedules, tracks)|build
 libcairo2-dev|draws over pictures: calibration, window|build
+libx11-dev|the screen of the window|build
 libusb-1.0-0-dev|DMD boards on the USB|build
 libeigen3-dev|linear algebra of estimates and calibrations|build
 libxxhash-dev|hashes of recorded frames|build

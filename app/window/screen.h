@@ -12,7 +12,7 @@ namespace codedexposure::app
 
 struct Screen {
   /** Whether the X display can be opened. GStreamer's sinks show nothing where
-   * it cannot, or crash. True where it is not known. */
+   * it cannot, or crash. */
   bool opens = true;
   /** In pixels; none: not known. */
   std::optional<Extent> size = {};

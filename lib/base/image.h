@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <type_traits>
 #include <vector>
 
@@ -83,6 +84,9 @@ public:
   }
   T &at (int x, int y) { return view ().at (x, y); }
   const T &at (int x, int y) const { return view ().at (x, y); }
+  /** All of them, row by row. */
+  std::span<T> pixels () { return pixels_; }
+  const std::vector<T> &pixels () const { return pixels_; }
 
   bool operator== (const Image &) const = default;
 

@@ -344,11 +344,8 @@ Calibration::gratings (Axis axis) const
 Result<Image<std::uint8_t>>
 Calibration::usable_pixels (CalibrationResult &result) const
 {
-  std::vector<float> contrasts;
-  each_pixel (result.contrast,
-      [&] (int x, int y) { contrasts.push_back (result.contrast.at (x, y)); });
-  const float covered =
-      std::max (1.0f, kCovered * quantile (std::move (contrasts), 0.9));
+  const float covered = std::max (1.0f,
+      kCovered * quantile (std::as_const (result.contrast).pixels (), 0.9));
   Image<std::uint8_t> usable (camera_.width, camera_.height);
   each_pixel (usable, [&] (int x, int y) {
     PixelQuality &quality = result.quality.at (x, y);
@@ -437,8 +434,8 @@ try {
   evaluate_pairs ({});
   shrink_gratings ({});
   for (Slot &slot : slots_)
-    each_pixel (slot.sum, [&slot, part = 1.0f / float (slot.frames)] (
-                              int x, int y) { slot.sum.at (x, y) *= part; });
+    for (float &sum : slot.sum.pixels ())
+      sum *= 1.0f / float (slot.frames);
   return fit ();
 } catch (const std::bad_alloc &) {
   return out_of_memory ();
@@ -447,10 +444,7 @@ try {
 std::uint64_t
 CalibrationResult::pixels (PixelQuality what) const
 {
-  std::uint64_t count = 0;
-  each_pixel (
-      quality, [&] (int x, int y) { count += quality.at (x, y) == what; });
-  return count;
+  return std::uint64_t (std::ranges::count (quality.pixels (), what));
 }
 
 } // namespace codedexposure

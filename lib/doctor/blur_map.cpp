@@ -194,11 +194,8 @@ variance_of (const BlockPowers &seen, const Expected &expected)
 double
 BlurMap::median () const
 {
-  std::vector<float> known;
-  each_pixel (variance, [&] (int x, int y) {
-    if (variance.at (x, y) >= 0.0f)
-      known.push_back (variance.at (x, y));
-  });
+  std::vector<float> known = variance.pixels ();
+  std::erase_if (known, [] (float value) { return !(value >= 0.0f); });
   return std::sqrt (double (codedexposure::median (std::move (known))));
 }
 

@@ -270,10 +270,7 @@ Search::find_dim ()
 Defects
 Search::run ()
 {
-  std::vector<float> values;
-  each_pixel (
-      off_, [&] (int x, int y) { values.push_back (field_.at (x, y)); });
-  bright_ = quantile (std::move (values), 0.9);
+  bright_ = quantile (std::as_const (field_).pixels (), 0.9);
   const float least =
       std::max (float (kCovered) * bright_, 0.005f * float (largest_));
   each_pixel (off_,

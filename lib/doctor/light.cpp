@@ -62,18 +62,16 @@ bool
 LightCheck::judge_level (const Stack &all, const Stack &dark)
 {
   const int largest = parts_.largest ();
-  std::vector<float> values;
   double full = 0.0; // pixels of a frame
   each_pixel (all.mean, [&] (int x, int y) {
-    values.push_back (all.mean.at (x, y));
     /* Pixels that are bright without light are hot. In those that are full in
      * some frames only, the light changes. */
     if (dark.mean.at (x, y) < 0.2f * float (largest) &&
-        values.back () > 0.99f * float (largest))
+        all.mean.at (x, y) > 0.99f * float (largest))
       full += double (all.full.at (x, y)) / all.frames;
   });
-  const double pixels = double (values.size ());
-  const double peak = double (quantile (std::move (values), kPeak));
+  const double pixels = double (all.mean.pixels ().size ());
+  const double peak = double (quantile (all.mean.pixels (), kPeak));
   const double black = mean_of (dark.mean.view ());
   const Measured level{
       100.0 * (peak - black) / std::max (1.0, largest - black), 0.0};

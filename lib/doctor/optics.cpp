@@ -123,7 +123,8 @@ OpticsRun::show_patterns ()
               [&] (int x, int y) { mean.at (x, y) += picture.at (x, y); });
         }));
     RETURN_IF_ERROR (kept);
-    each_pixel (mean, [&] (int x, int y) { mean.at (x, y) /= frames; });
+    for (float &sum : mean.pixels ())
+      sum /= frames;
     keep (pattern, std::move (mean));
   }
   return {};
@@ -317,9 +318,8 @@ void
 OpticsRun::diagnose_no_mapping (const Error &why)
 {
   const float largest = float (examination_.rig.parts ().largest ());
-  double full = 0.0;
-  each_pixel (stack_.white,
-      [&] (int x, int y) { full += stack_.white.at (x, y) >= largest; });
+  const double full = double (std::ranges::count_if (stack_.white.pixels (),
+      [&] (float light) { return light >= largest; }));
   const double part = full / camera_.width / camera_.height;
   if (part > 0.3)
     return finding_.blame ("bright", fixed (100 * part, 0) +

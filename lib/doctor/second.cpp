@@ -350,11 +350,10 @@ SecondRun::measure_light ()
   ASSIGN_OR_RETURN (const Both on, look (lit (0, 1), 1, kFrames));
   ASSIGN_OR_RETURN (
       const Stack bright, look_at_light (other_, lit (0, 1), 1, kFrames));
-  double full = 0.0;
-  each_pixel (
-      bright.mean, [&] (int x, int y) { full += bright.full.at (x, y) > 0; });
-  const double pixels = double (bright.mean.width ()) * bright.mean.height ();
-  finding_.measure ("second-bright", {100 * full / pixels, 0.0});
+  const auto &full = bright.full.pixels (); // frames, of each pixel
+  const auto pixels = double (full.size ());
+  finding_.measure ("second-bright",
+      {100 * (pixels - double (std::ranges::count (full, 0))) / pixels, 0.0});
   const auto light_of = [] (const Measured &light, const Measured &dark) {
     return Measured{
         light.value - dark.value, std::hypot (light.sigma, dark.sigma)};
@@ -400,7 +399,7 @@ SecondRun::compare_views (const Mapping &of_second)
   };
   const auto [mirrored, angle] = turn (of_second);
   finding_.notes.emplace_back ("orientation of the second camera",
-      std::string (mirrored ? "mirror image" : "no mirror image") +
+      std::string (xx * yy < xy * yx ? "mirror image" : "no mirror image") +
           " of the mirrors, its rows turned by " + fixed (angle, 1) +
           " degrees");
   const auto &of_first = examination_.profile.mapping;

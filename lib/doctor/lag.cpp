@@ -37,39 +37,13 @@ struct Change {
   bool mixed = false;           ///< the old mask came again after the new one
 };
 
-class LagCheck
-{
-public:
-  LagCheck (Examination &examination, Nanoseconds last, Finding &finding)
-      : examination_ (examination), rig_ (examination.rig),
-        period_ (rig_.parts ().period ()), largest_ (rig_.parts ().largest ()),
-        finding_ (finding), last_ (last)
-  {
-  }
-
-  Result<bool> run ();
-
-private:
-  Result<std::vector<SeenFrame>> change (bool all);
-  Change judge (const std::vector<SeenFrame> &seen, double before, double after,
-      Nanoseconds last) const;
-  void diagnose_lag (const std::vector<Change> &changes);
-
-  Examination &examination_;
-  Rig &rig_;
-  double period_; // s
-  int largest_;
-  Finding &finding_;
-  Nanoseconds last_;
-};
-
 /** Shows all mirrors on in the whole period, or in one tile of the middle. */
 Result<std::vector<SeenFrame>>
-LagCheck::change (bool all)
+change_mask (Rig &rig, bool all)
 {
   RETURN_IF_ERROR (
-      rig_.show (all ? lit (0, kTiles) : lit (kTiles / 2, 1), kTiles));
-  ASSIGN_OR_RETURN (auto seen, rig_.watch (kFramesOfChange));
+      rig.show (all ? lit (0, kTiles) : lit (kTiles / 2, 1), kTiles));
+  ASSIGN_OR_RETURN (auto seen, rig.watch (kFramesOfChange));
   std::erase_if (seen, &SeenFrame::damaged);
   return seen;
 }
@@ -77,11 +51,11 @@ LagCheck::change (bool all)
 /** @p before, @p after: levels of the masks. @p last: stamp of the frame before
  * the change. */
 Change
-LagCheck::judge (const std::vector<SeenFrame> &seen, double before,
-    double after, Nanoseconds last) const
+change_of (const std::vector<SeenFrame> &seen, double before, double after,
+    Nanoseconds last, const RigParts &parts)
 {
-  const auto cycles = [this] (Nanoseconds a, Nanoseconds b) {
-    return std::lround (1e-9 * double (b - a) / period_);
+  const auto cycles = [&parts] (Nanoseconds a, Nanoseconds b) {
+    return std::lround (1e-9 * double (b - a) / parts.period ());
   };
   // A show () leaves out a cycle at least; frames before that pause, the last
   // of which may be cut short, are of the mask before.
@@ -100,7 +74,8 @@ LagCheck::judge (const std::vector<SeenFrame> &seen, double before,
   const double between =
       std::min (before, after) + kBrighter * std::abs (before - after);
   for (std::size_t i = pause; i < seen.size (); i++) {
-    const double mean = level_of (seen[i].picture.view (), largest_).mean;
+    const double mean =
+        level_of (seen[i].picture.view (), parts.largest ()).mean;
     const double off =
         std::abs (mean - after) / std::max (1e-9, std::abs (before - after));
     const bool is_old = (mean > between) == (before > after);
@@ -119,53 +94,9 @@ LagCheck::judge (const std::vector<SeenFrame> &seen, double before,
   return change;
 }
 
-/** In which frame a new mask shows first. */
-Result<bool>
-LagCheck::run ()
-{
-  double levels[2] = {};
-  std::vector<Change> changes;
-  for (int i = 0; i < kChanges + 2; i++) {
-    ASSIGN_OR_RETURN (const auto seen, change (i % 2 == 0));
-    if (seen.empty ()) {
-      finding_.blame ("no-trigger", "frames ended after a change of the mask");
-      return false;
-    }
-    const Level level = level_of (seen.back ().picture.view (), largest_);
-    const double before = levels[(i + 1) % 2];
-    levels[i % 2] = level.mean;
-    if (i >= 2)
-      changes.push_back (judge (seen, before, level.mean, last_));
-    last_ = seen.back ().time;
-    if (i != 1)
-      continue;
-    if (level.saturated > 0.5) {
-      finding_.blame ("bright",
-          "an eighth of the frame period is enough light to saturate the "
-          "camera");
-      return false;
-    }
-    if (levels[0] - levels[1] < kFaint * largest_ &&
-        levels[0] > kBright * largest_) {
-      finding_.blame ("bright",
-          "all mirrors on instead of an eighth of the time make no more than " +
-              shown (levels[0]) + " of " + std::to_string (largest_) + " DN");
-      return false;
-    }
-    if (levels[0] - levels[1] < kFaint * largest_) {
-      finding_.blame (
-          "dark", "all mirrors on instead of an eighth of the time add " +
-                      shown (levels[0] - levels[1]) + " of " +
-                      std::to_string (largest_) + " DN");
-      return false;
-    }
-  }
-  diagnose_lag (changes);
-  return true;
-}
-
 void
-LagCheck::diagnose_lag (const std::vector<Change> &changes)
+diagnose_lag (const std::vector<Change> &changes, Examination &examination,
+    Finding &finding)
 {
   int old = 1, lost = 0, number = 0;
   bool mixed = false;
@@ -181,22 +112,22 @@ LagCheck::diagnose_lag (const std::vector<Change> &changes)
     sum += *change.late;
     number++;
   }
-  examination_.lag = old + 1;
+  examination.lag = old + 1;
   if (number == 0)
     return;
   const auto usual = std::ranges::max_element (
       counts, {}, [] (const auto &count) { return count.second; });
   const int low = counts.begin ()->first, high = counts.rbegin ()->first;
-  finding_.add ("lag", {sum / number, 0.5 * (high - low)});
+  finding.add ("lag", {sum / number, 0.5 * (high - low)});
   // A frame that is lost after the pause takes one from the count.
   const int fewer = high == usual->first ? (lost > 0 ? 2 : 1) : 0;
   if (mixed || number - usual->second > fewer)
-    finding_.blame ("frame-late-varies",
+    finding.blame ("frame-late-varies",
         "a new mask shows " + std::to_string (low) + " to " +
             std::to_string (high) +
             " frames late: the camera or the network holds frames back");
   else if (usual->first > 0)
-    finding_.blame ("frame-late",
+    finding.blame ("frame-late",
         "every frame shows the mask of " + std::to_string (usual->first) +
             (usual->first > 1 ? " frames" : " frame") + " before");
 }
@@ -206,7 +137,44 @@ LagCheck::diagnose_lag (const std::vector<Change> &changes)
 Result<bool>
 check_lag (Examination &examination, Nanoseconds last, Finding &finding)
 {
-  return LagCheck (examination, last, finding).run ();
+  Rig &rig = examination.rig;
+  const int largest = rig.parts ().largest ();
+  double levels[2] = {};
+  std::vector<Change> changes;
+  for (int i = 0; i < kChanges + 2; i++) {
+    ASSIGN_OR_RETURN (const auto seen, change_mask (rig, i % 2 == 0));
+    if (seen.empty ()) {
+      finding.blame ("no-trigger", "frames ended after a change of the mask");
+      return false;
+    }
+    const Level level = level_of (seen.back ().picture.view (), largest);
+    const double before = levels[(i + 1) % 2];
+    levels[i % 2] = level.mean;
+    if (i >= 2)
+      changes.push_back (
+          change_of (seen, before, level.mean, last, rig.parts ()));
+    last = seen.back ().time;
+    if (i != 1)
+      continue;
+    const double step = levels[0] - levels[1];
+    if (level.saturated > 0.5)
+      finding.blame ("bright",
+          "an eighth of the frame period is enough light to saturate the "
+          "camera");
+    else if (step >= kFaint * largest)
+      continue;
+    else if (levels[0] > kBright * largest)
+      finding.blame ("bright",
+          "all mirrors on instead of an eighth of the time make no more than " +
+              shown (levels[0]) + " of " + std::to_string (largest) + " DN");
+    else
+      finding.blame (
+          "dark", "all mirrors on instead of an eighth of the time add " +
+                      shown (step) + " of " + std::to_string (largest) + " DN");
+    return false;
+  }
+  diagnose_lag (changes, examination, finding);
+  return true;
 }
 
 } // namespace codedexposure

@@ -39,82 +39,48 @@ struct Place {
   }
 };
 
-/* Normal equations of the displacements of the nodes. */
-class NodeEquations
-{
-public:
-  explicit NodeEquations (const Displacement &grid)
-      : columns_ (grid.columns), rows_ (grid.rows),
-        right_ (VectorXd::Zero (columns_ * rows_))
-  {
-  }
+/* Of normal equations, whose unknowns are the displacements of the nodes. */
+using Entries = std::vector<Eigen::Triplet<double>>;
 
-  void add_block (const PhaseFit::Block &block, const Place &x, const Place &y);
-  void add_roughness ();
-  VectorXd solve () const;
-
-private:
-  using Nodes = std::span<const Index>;
-  using Factors = std::span<const double>;
-  /* Of weight (sum of factors * nodes) ^ 2. */
-  void add (Nodes nodes, Factors factors, double weight);
-
-  Index columns_, rows_;
-  std::vector<Eigen::Triplet<double>> entries_;
-  VectorXd right_;
-};
-
+/* Adds weight (sum of factors * nodes) ^ 2. */
 void
-NodeEquations::add (Nodes nodes, Factors factors, double weight)
+add (Entries &entries, std::span<const Index> nodes,
+    std::span<const double> factors, double weight)
 {
   for (std::size_t i = 0; i < nodes.size (); i++)
     for (std::size_t j = 0; j < nodes.size (); j++)
-      entries_.emplace_back (
+      entries.emplace_back (
           nodes[i], nodes[j], weight * factors[i] * factors[j]);
-}
-
-/* A block sees its displacement between the four nodes around it. */
-void
-NodeEquations::add_block (
-    const PhaseFit::Block &block, const Place &x, const Place &y)
-{
-  const Index node = y.low * columns_ + x.low;
-  const Index nodes[] = {node, node + 1, node + columns_, node + columns_ + 1};
-  const double factors[] = {(1 - x.part) * (1 - y.part), x.part * (1 - y.part),
-      (1 - x.part) * y.part, x.part * y.part};
-  add (nodes, factors, block.information);
-  for (std::size_t i = 0; i < 4; i++)
-    right_[nodes[i]] += factors[i] * block.score;
 }
 
 /* Second differences along rows and columns. */
 void
-NodeEquations::add_roughness ()
+add_roughness (Entries &entries, Index columns, Index rows)
 {
   constexpr double kFactors[] = {1.0, -2.0, 1.0};
   constexpr double kWeight = 1.0 / (kRoughness * kRoughness);
-  for (Index row = 0; row < rows_; row++)
-    for (Index column = 0; column < columns_; column++) {
-      const Index at = row * columns_ + column;
-      if (column > 0 && column + 1 < columns_)
-        add ({{at - 1, at, at + 1}}, kFactors, kWeight);
-      if (row > 0 && row + 1 < rows_)
-        add ({{at - columns_, at, at + columns_}}, kFactors, kWeight);
+  for (Index row = 0; row < rows; row++)
+    for (Index column = 0; column < columns; column++) {
+      const Index at = row * columns + column;
+      if (column > 0 && column + 1 < columns)
+        add (entries, {{at - 1, at, at + 1}}, kFactors, kWeight);
+      if (row > 0 && row + 1 < rows)
+        add (entries, {{at - columns, at, at + columns}}, kFactors, kWeight);
     }
 }
 
 /* Zero if the equations have no solution. */
 VectorXd
-NodeEquations::solve () const
+solve (const Entries &entries, const VectorXd &right)
 {
-  SparseMatrix matrix (right_.size (), right_.size ());
-  matrix.setFromTriplets (entries_.begin (), entries_.end ());
+  SparseMatrix matrix (right.size (), right.size ());
+  matrix.setFromTriplets (entries.begin (), entries.end ());
   Eigen::ConjugateGradient<SparseMatrix> solver;
   solver.setTolerance (kTolerance);
   solver.setMaxIterations (kMaxIterations);
   solver.compute (matrix);
-  const VectorXd nodes = solver.solve (right_);
-  return nodes.allFinite () ? nodes : VectorXd::Zero (right_.size ());
+  const VectorXd nodes = solver.solve (right);
+  return nodes.allFinite () ? nodes : VectorXd::Zero (right.size ());
 }
 
 } // namespace
@@ -132,19 +98,27 @@ reduced_chi_square (std::span<const PhaseFit::Block> blocks, double noise_ratio)
 }
 
 void
-add_displacement (Displacement &grid, std::vector<double> &nodes,
+add_displacement (const Displacement &grid, std::vector<double> &nodes,
     std::span<const PhaseFit::Block> blocks, int block_size, Extent camera)
 {
-  NodeEquations equations (grid);
+  Entries entries;
+  VectorXd right = VectorXd::Zero (Index (nodes.size ()));
   const int across = (camera.width + block_size - 1) / block_size;
-  for (std::size_t i = 0; i < blocks.size (); i++)
-    equations.add_block (blocks[i],
-        {int (i) % across, block_size, camera.width, grid.columns},
-        {int (i) / across, block_size, camera.height, grid.rows});
-  equations.add_roughness ();
-  const VectorXd change = equations.solve ();
-  for (std::size_t i = 0; i < nodes.size (); i++)
-    nodes[i] += change[Index (i)];
+  for (std::size_t i = 0; i < blocks.size (); i++) {
+    const Place x (int (i) % across, block_size, camera.width, grid.columns);
+    const Place y (int (i) / across, block_size, camera.height, grid.rows);
+    /* A block sees its displacement between the four nodes around it. */
+    const Index node = y.low * grid.columns + x.low;
+    const Index around[] = {
+        node, node + 1, node + grid.columns, node + grid.columns + 1};
+    const double factors[] = {(1 - x.part) * (1 - y.part),
+        x.part * (1 - y.part), (1 - x.part) * y.part, x.part * y.part};
+    add (entries, around, factors, blocks[i].information);
+    for (std::size_t k = 0; k < 4; k++)
+      right[around[k]] += factors[k] * blocks[i].score;
+  }
+  add_roughness (entries, grid.columns, grid.rows);
+  Eigen::Map<VectorXd> (nodes.data (), right.size ()) += solve (entries, right);
 }
 
 } // namespace codedexposure

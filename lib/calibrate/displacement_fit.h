@@ -18,7 +18,7 @@ double reduced_chi_square (
 
 /** Adds the displacements of the blocks to @p nodes, the nodes of one axis of
  * @p grid. Between the blocks it is smooth. */
-void add_displacement (Displacement &grid, std::vector<double> &nodes,
+void add_displacement (const Displacement &grid, std::vector<double> &nodes,
     std::span<const PhaseFit::Block> blocks, int block_size, Extent camera);
 
 } // namespace codedexposure

@@ -39,21 +39,6 @@ decode (const GrayCode &gx, const GrayCode &gy,
   return samples;
 }
 
-/* The affine mapping through all samples, outliers included. */
-Homography
-start_of (const std::vector<Sample> &samples)
-{
-  HomographyFit fit;
-  for (const Sample &s : samples) {
-    const Projected zero = {0.0, 0.0, 1.0};
-    fit.add (s.xi, s.eta, zero, {s.x, 1.0}, {s.y, 1.0});
-  }
-  Homography h = {0, 0, 0, 0, 0, 0, 0, 0, 1};
-  if (const auto step = fit.solve (6, false))
-    std::copy_n (step->change.begin (), 6, h.begin ());
-  return h;
-}
-
 } // namespace
 
 double
@@ -76,13 +61,15 @@ fit_gray_codes (const GrayCode &gx, const GrayCode &gy,
   if (samples.size () < 100)
     return lost;
 
-  Homography h = start_of (samples);
+  Homography h = {0, 0, 0, 0, 0, 0, 0, 0, 1};
   const double stripe = std::max (gx.width, gy.width);
-  /* The limit for outliers shrinks to 1.5 stripes: half a stripe is the error
-   * of the code itself. */
+  /* The limit for outliers shrinks to 1.5 stripes, as half a stripe is the
+   * error of the code itself; the first affine mapping is that through all
+   * samples.
+   */
   double limit = 1e9;
   std::size_t agree = 0;
-  for (int round = 0; round < 12; round++) {
+  for (int round = 0; round <= 12; round++) {
     HomographyFit fit;
     double squares = 0.0;
     agree = 0;
@@ -95,12 +82,14 @@ fit_gray_codes (const GrayCode &gx, const GrayCode &gy,
       squares += dx * dx + dy * dy;
       fit.add (s.xi, s.eta, at, {dx, 1.0}, {dy, 1.0});
     }
-    const auto step = fit.solve (round < 4 ? 6 : 8, false);
+    const auto step = fit.solve (round <= 4 ? 6 : 8, false);
     if (!step)
       return lost;
     for (std::size_t i = 0; i < 8; i++)
       h[i] += step->change[i];
-    limit = std::max (1.5 * stripe, 1.5 * std::sqrt (squares / double (agree)));
+    if (round > 0)
+      limit =
+          std::max (1.5 * stripe, 1.5 * std::sqrt (squares / double (agree)));
   }
   if (double (agree) < kMajority * double (samples.size ()) ||
       limit > 2.0 * stripe)

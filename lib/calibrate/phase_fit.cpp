@@ -287,40 +287,31 @@ struct Conditions {
   double margin_x, margin_y; // of mirrors whose pixels see the edge
   float limit_x, limit_y;    // of chi-square; outliers have more
 
-  explicit Conditions (const PhaseFit &fit) : Conditions (fit, sides_of (fit))
-  {
-  }
-
   bool sees_edge (Position m, Extent mirrors) const
   {
     return m.x < margin_x - 0.5 || m.x > mirrors.width - 0.5 - margin_x ||
            m.y < margin_y - 0.5 || m.y > mirrors.height - 0.5 - margin_y;
   }
-
-private:
-  Conditions (const PhaseFit &fit, Position sides)
-      : x (fit.x.period (), sides.x, std::sqrt (fit.blur_x)),
-        y (fit.y.period (), sides.y, std::sqrt (fit.blur_y)),
-        margin_x (reach (sides.x, fit.blur_x)),
-        margin_y (reach (sides.y, fit.blur_y)),
-        limit_x (limit (fit.reduced_chi_square, x.period ())),
-        limit_y (limit (fit.reduced_chi_square, y.period ()))
-  {
-  }
-  /* Of the pixel in the middle, in mirrors. */
-  static Position sides_of (const PhaseFit &fit)
-  {
-    const auto slope = fit.mapping.slope_at (
-        0.5 * (fit.camera.width - 1), 0.5 * (fit.camera.height - 1));
-    return {std::hypot (slope[0], slope[1]), std::hypot (slope[2], slope[3])};
-  }
-  static float limit (double reduced_chi_square, int phases)
-  {
-    const double freedom = std::max (1, phases - 3);
-    return float (reduced_chi_square * freedom *
-                  (1.0 + kOutlierSigmas * std::sqrt (2.0 / freedom)));
-  }
 };
+
+Conditions
+conditions_of (const PhaseFit &fit)
+{
+  const auto limit = [&fit] (int phases) {
+    const double freedom = std::max (1, phases - 3);
+    return float (fit.reduced_chi_square * freedom *
+                  (1.0 + kOutlierSigmas * std::sqrt (2.0 / freedom)));
+  };
+  /* Of the pixel in the middle, in mirrors. */
+  const auto slope = fit.mapping.slope_at (
+      0.5 * (fit.camera.width - 1), 0.5 * (fit.camera.height - 1));
+  const double side_x = std::hypot (slope[0], slope[1]);
+  const double side_y = std::hypot (slope[2], slope[3]);
+  return {{fit.x.period (), side_x, std::sqrt (fit.blur_x)},
+      {fit.y.period (), side_y, std::sqrt (fit.blur_y)},
+      reach (side_x, fit.blur_x), reach (side_y, fit.blur_y),
+      limit (fit.x.period ()), limit (fit.y.period ())};
+}
 
 HomographyFit::Observation
 observation (const PixelFit &f)
@@ -369,7 +360,7 @@ moved (double blur, double change)
 PhaseSums
 sum_up (PhaseFit &p)
 {
-  const Conditions at (p);
+  const Conditions at = conditions_of (p);
   const CentredFrame frame (p.camera);
   const Homography centred = p.mapping.centred ();
   const Rounding rounding (p.noise, p.frames);
@@ -452,7 +443,7 @@ PhaseFit::round (std::size_t numbers)
 void
 PhaseFit::estimate_noise ()
 {
-  const Conditions at (*this);
+  const Conditions at = conditions_of (*this);
   NoiseBins bins;
   float brightest = 1.0f;
   for (int py = 0; py < camera.height; py += 8)

@@ -164,8 +164,8 @@ try {
                        int (gratings.size ()) == gratings[0]->pattern.period &&
                        gratings.size () >= 4;
     if (!whole || !made.has_gray_code (axis) ||
-        made.find (Pattern::Kind::dark) == nullptr ||
-        made.find (Pattern::Kind::white) == nullptr)
+        made.find ({Pattern::Kind::dark}) == nullptr ||
+        made.find ({Pattern::Kind::white}) == nullptr)
       return Error{"a calibration needs dark, white, the Gray codes of x and y "
                    "with their inverses and gratings of one period, 4 or "
                    "more, at all phases, as calibration_patterns () has them"};
@@ -248,14 +248,6 @@ Calibration::missing () const
     if (slot.frames == 0)
       patterns.push_back (slot.pattern);
   return patterns;
-}
-
-const Calibration::Slot *
-Calibration::find (Pattern::Kind kind) const
-{
-  const auto at = std::find_if (slots_.begin (), slots_.end (),
-      [kind] (const Slot &s) { return s.pattern.kind == kind; });
-  return at == slots_.end () ? nullptr : &*at;
 }
 
 bool
@@ -382,10 +374,10 @@ Calibration::gray_difference (Axis axis, const CalibrationResult &result) const
 }
 
 Result<CalibrationResult>
-Calibration::fit () const
+Calibration::fit ()
 {
-  const Image<float> &dark = find (Pattern::Kind::dark)->sum;
-  const Image<float> &white = find (Pattern::Kind::white)->sum;
+  const Image<float> &dark = find ({Pattern::Kind::dark})->sum;
+  const Image<float> &white = find ({Pattern::Kind::white})->sum;
   const Image<float> dark_smooth = smoothed (dark);
   const Image<float> white_smooth = smoothed (white);
   CalibrationResult result = {Mapping (camera_), 0, 0, 0,

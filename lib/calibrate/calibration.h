@@ -92,9 +92,8 @@ private:
   };
 
   Calibration (Extent camera, Extent mirrors, int row_step);
+  /** Null if there is none. */
   Slot *find (const Pattern &pattern);
-  /** The first one; null if there is none. */
-  const Slot *find (Pattern::Kind kind) const;
   /** Whether all bits of the Gray code of @p axis are there, with inverses. */
   bool has_gray_code (Axis axis) const;
   /** Keeps the bits of pairs that are complete, but for that of @p pattern. */
@@ -106,7 +105,7 @@ private:
   std::vector<const Slot *> gratings (Axis axis) const;
   Result<Image<std::uint8_t>> usable_pixels (CalibrationResult &result) const;
   double gray_difference (Axis axis, const CalibrationResult &result) const;
-  Result<CalibrationResult> fit () const;
+  Result<CalibrationResult> fit ();
 
   Extent camera_, mirrors_;
   int row_step_;

@@ -385,19 +385,9 @@ SecondRun::measure_light ()
 void
 SecondRun::compare_views (const Mapping &of_second)
 {
-  const auto turn = [] (const Mapping &mapping) {
-    const Position centre = {
-        0.5 * mapping.camera ().width, 0.5 * mapping.camera ().height};
-    const auto at = [&] (double x, double y) {
-      return mapping.mirror_at (centre.x + x, centre.y + y);
-    };
-    const Position o = at (0, 0), x = at (1, 0), y = at (0, 1);
-    const double determinant =
-        (x.x - o.x) * (y.y - o.y) - (x.y - o.y) * (y.x - o.x);
-    return std::pair (determinant < 0.0,
-        std::atan2 (x.y - o.y, x.x - o.x) * 180.0 / std::numbers::pi);
-  };
-  const auto [mirrored, angle] = turn (of_second);
+  const auto [xx, xy, yx, yy] = of_second.slope_at (
+      0.5 * of_second.camera ().width, 0.5 * of_second.camera ().height);
+  const double angle = std::atan2 (yx, xx) * 180.0 / std::numbers::pi;
   finding_.notes.emplace_back ("orientation of the second camera",
       std::string (xx * yy < xy * yx ? "mirror image" : "no mirror image") +
           " of the mirrors, its rows turned by " + fixed (angle, 1) +

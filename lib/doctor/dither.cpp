@@ -62,7 +62,6 @@ public:
   Result<void> look (bool longer);
   std::optional<Dark> fit () const;
 
-  double part () const { return part_; }
   const StackMeans &shorter () const { return shorter_; }
 
 private:

@@ -31,13 +31,6 @@ Finding::verdict () const
   return worst;
 }
 
-bool
-Finding::is_ill () const
-{
-  return std::ranges::any_of (diagnoses,
-      [] (const Diagnosis &each) { return each.severity >= Verdict::warn; });
-}
-
 const Reading *
 Finding::reading (std::string_view name) const
 {

@@ -65,7 +65,7 @@ struct Finding {
    * is no finite number. */
   Verdict verdict () const;
   /** Whether a diagnosis says that something is wrong. */
-  bool is_ill () const;
+  bool is_ill () const { return verdict () >= Verdict::warn; }
   /** Null if there is none of that name. */
   const Reading *reading (std::string_view name) const;
 

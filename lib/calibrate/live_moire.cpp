@@ -89,28 +89,16 @@ struct Carrier {
 
 /* Phasors of one grating, one per block of T x T pixels. */
 struct Phasors {
-  int columns = 0, rows = 0;
-  double first_x = 0, first_y = 0; // centre of the first one, pixels
-  std::vector<Phasor> at;
-  Fringes fringes;
+  double first_x, first_y; // centre of the first one, pixels
+  Image<Phasor> all;
+  Fringes fringes = {Image<float> (all.width (), all.height ()),
+      Image<float> (all.width (), all.height ())};
   float reference = 0.0f; // amplitude of blocks that show the grating
   double power = 0.0;
 
-  void resize (int width, int height)
+  bool is_seen (Phasor z) const
   {
-    columns = width;
-    rows = height;
-    at.resize (std::size_t (width) * std::size_t (height));
-    fringes.phase = fringes.amplitude = Image<float> (width, height);
-  }
-  const Phasor *row (int r) const
-  {
-    return at.data () + std::ptrdiff_t (r) * columns;
-  }
-  Phasor *row (int r) { return at.data () + std::ptrdiff_t (r) * columns; }
-  bool shows (std::size_t i) const
-  {
-    return std::norm (at[i]) > kFaint * kFaint * reference * reference;
+    return std::norm (z) > kFaint * kFaint * reference * reference;
   }
 
   std::complex<double> product (int lag_x, int lag_y) const;
@@ -122,11 +110,11 @@ std::complex<double>
 Phasors::product (int lag_x, int lag_y) const
 {
   std::complex<double> sum = 0.0;
-  for (int r = 0; r + lag_y < rows; r++) {
-    const Phasor *here = row (r);
-    const Phasor *there = row (r + lag_y) + lag_x;
+  for (int r = 0; r + lag_y < all.height (); r++) {
+    const Phasor *here = all.view ().row (r);
+    const Phasor *there = all.view ().row (r + lag_y) + lag_x;
     float re = 0.0f, im = 0.0f;
-    for (int c = 0; c + lag_x < columns; c++) {
+    for (int c = 0; c + lag_x < all.width (); c++) {
       re += here[c].real () * there[c].real () +
             here[c].imag () * there[c].imag ();
       im += here[c].real () * there[c].imag () -
@@ -142,7 +130,8 @@ double
 Phasors::slope (bool along_y) const
 {
   double slope = 0.0;
-  for (int lag = 1; lag <= (along_y ? rows : columns) / 2; lag *= 4) {
+  const int length = along_y ? all.height () : all.width ();
+  for (int lag = 1; lag <= length / 2; lag *= 4) {
     const auto sum = along_y ? product (0, lag) : product (lag, 0);
     slope += std::arg (sum * std::polar (1.0, -lag * slope)) / lag;
   }
@@ -216,22 +205,17 @@ rest_of (Phasor z, Phasor back)
 
 struct LiveMoire::State {
   State (const Mapping &where, const LiveMoireOptions &how, int samples)
-      : expected (where), options (how), carrier (samples)
+      : expected (where), options (how), carrier (samples),
+        blocks_x (where.camera ().width / samples),
+        blocks_y (where.camera ().height / samples), x{double (samples),
+                                                         0.5 * (samples - 1),
+                                                         {blocks_x - 1,
+                                                             blocks_y}},
+        y{0.5 * (samples - 1), double (samples), {blocks_x, blocks_y - 1}},
+        columns (std::size_t (blocks_x * samples)), row_sums (columns),
+        rising (std::size_t (blocks_x))
   {
-    const Extent camera = where.camera ();
-    blocks_x = camera.width / samples;
-    blocks_y = camera.height / samples;
-    const double middle = 0.5 * (samples - 1);
-    x.resize (blocks_x - 1, blocks_y);
-    x.first_x = samples;
-    x.first_y = middle;
-    y.resize (blocks_x, blocks_y - 1);
-    y.first_x = middle;
-    y.first_y = samples;
-    columns.resize (std::size_t (blocks_x * samples));
-    row_sums.resize (std::size_t (blocks_x * samples));
-    rising.resize (std::size_t (blocks_x));
-    sorted.reserve (std::max (x.at.size (), y.at.size ()));
+    sorted.reserve (std::size_t (blocks_x * blocks_y));
   }
 
   Mapping expected;
@@ -291,7 +275,7 @@ LiveMoire::State::collect (ImageView<const Pixel> frame)
 void
 LiveMoire::State::demodulate_x (int block_row)
 {
-  Phasor *out = x.row (block_row);
+  Phasor *out = x.all.view ().row (block_row);
   Phasor before = 0.0f;
   for (int c = 0; c < blocks_x; c++) {
     Phasor whole, rise;
@@ -310,7 +294,7 @@ LiveMoire::State::demodulate_y (int block_row)
     carrier.demodulate (
         row_sums.data () + c, std::size_t (blocks_x), whole, rise);
     if (block_row > 0)
-      y.row (block_row - 1)[c] = rising[std::size_t (c)] + whole - rise;
+      y.all.at (c, block_row - 1) = rising[std::size_t (c)] + whole - rise;
     rising[std::size_t (c)] = rise;
   }
 }
@@ -322,16 +306,15 @@ LiveMoire::State::find_grating (Phasors &phasors, const char *name)
   const float to_amplitude = 2.0f / float (carrier.period * carrier.period);
   phasors.power = 0.0;
   sorted.clear ();
-  for (int r = 0; r < phasors.rows; r++)
-    for (int c = 0; c < phasors.columns; c++) {
-      const Phasor z = phasors.row (r)[c];
-      const float norm = std::norm (z);
-      const float size = std::sqrt (norm);
-      phasors.power += double (norm);
-      phasors.fringes.phase.at (c, r) = std::atan2 (z.imag (), z.real ());
-      phasors.fringes.amplitude.at (c, r) = to_amplitude * size;
-      sorted.push_back (size);
-    }
+  each_pixel (phasors.all, [&] (int c, int r) {
+    const Phasor z = phasors.all.at (c, r);
+    const float norm = std::norm (z);
+    const float size = std::sqrt (norm);
+    phasors.power += double (norm);
+    phasors.fringes.phase.at (c, r) = std::atan2 (z.imag (), z.real ());
+    phasors.fringes.amplitude.at (c, r) = to_amplitude * size;
+    sorted.push_back (size);
+  });
   const auto high = sorted.begin () + std::ptrdiff_t (sorted.size () * 9 / 10);
   std::nth_element (sorted.begin (), high, sorted.end ());
   phasors.reference = *high;
@@ -356,10 +339,10 @@ LiveMoire::State::start (
   const double step = carrier.period;
 
   std::complex<double> mean = 0.0;
-  for (int j = 0; j < phasors.rows; j++)
-    for (int i = 0; i < phasors.columns; i++)
-      mean += std::complex<double> (phasors.row (j)[i]) *
-              std::polar (1.0, -(slope_x * i + slope_y * j));
+  each_pixel (phasors.all, [&] (int i, int j) {
+    mean += std::complex<double> (phasors.all.at (i, j)) *
+            std::polar (1.0, -(slope_x * i + slope_y * j));
+  });
   const double origin = std::arg (mean) -
                         slope_x * (phasors.first_x - cx) / step -
                         slope_y * (phasors.first_y - cy) / step;
@@ -386,17 +369,15 @@ LiveMoire::State::refine (
   const double xi0 = (phasors.first_x - cx) / r;
   const Phasor rotation (std::polar (1.0, -sign * plane.at[0] * step));
   PlaneSums sums;
-  for (int j = 0; j < phasors.rows; j++) {
+  for (int j = 0; j < phasors.all.height (); j++) {
     const double eta = (phasors.first_y - cy) / r + j * step;
     Phasor back (std::polar (
         1.0, -sign * (plane.at[0] * xi0 + plane.at[1] * eta + plane.at[2])));
     RowSums row;
-    for (int i = 0; i < phasors.columns; i++, back *= rotation) {
-      const std::size_t at = std::size_t (j * phasors.columns + i);
-      if (!phasors.shows (at))
-        continue;
-      if (const double rest = rest_of (phasors.at[at], back);
-          std::abs (rest) <= limit)
+    for (int i = 0; i < phasors.all.width (); i++, back *= rotation) {
+      const Phasor z = phasors.all.at (i, j);
+      const double rest = rest_of (z, back);
+      if (phasors.is_seen (z) && std::abs (rest) <= limit)
         row.add (xi0 + i * step, rest);
     }
     sums.add (row, eta);
@@ -480,11 +461,13 @@ LiveMoire::State::solve (ImageView<const Pixel> frame)
       2.0 / (carrier.period * carrier.period * std::max (1e-9, largest));
   reading.contrast = {
       to_contrast * double (x.reference), to_contrast * double (y.reference)};
-  std::size_t shown = 0;
+  std::size_t seen = 0, all = 0;
   for (const Phasors *phasors : {&x, &y})
-    for (std::size_t i = 0; i < phasors->at.size (); i++)
-      shown += phasors->shows (i);
-  reading.coverage = double (shown) / double (x.at.size () + y.at.size ());
+    for (const Phasor z : phasors->all.pixels ()) {
+      seen += phasors->is_seen (z);
+      all++;
+    }
+  reading.coverage = double (seen) / double (all);
   reading.saturated = count_saturated (frame, options.bits);
   return reading;
 }

@@ -3,10 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <set>
 #include <string>
 #include <vector>
+
+#include <Eigen/Core>
 
 namespace codedexposure
 {
@@ -23,21 +24,14 @@ constexpr int kZones = 8;
 constexpr double kCorrelated = 2.0;
 
 /* Light of the places of one period, relative to their mean, minus 1. */
-using Levels = std::vector<double>;
+using Levels = Eigen::VectorXd;
 
-void
-centre (Levels &pattern)
+Levels
+centred (const Levels &light)
 {
-  const double mean = std::accumulate (pattern.begin (), pattern.end (), 0.0) /
-                      double (pattern.size ());
-  for (double &place : pattern)
-    place = mean > 0.0 ? place / mean - 1.0 : 0.0;
-}
-
-double
-dot (const Levels &a, const Levels &b)
-{
-  return std::inner_product (a.begin (), a.end (), b.begin (), 0.0);
+  const double mean = light.mean ();
+  return mean > 0.0 ? Levels (light.array () / mean - 1.0)
+                    : Levels::Zero (light.size ());
 }
 
 /* The light of a flat scene through the code, with the tile at @phase. */
@@ -45,15 +39,15 @@ Levels
 pattern_at (const Schedule &schedule, Offset phase)
 {
   const Tile &tile = schedule.tile ();
-  Levels pattern;
+  Levels pattern (tile.period_x () * tile.period_y ());
+  Eigen::Index place = 0;
   for (int y = 0; y < tile.period_y (); y++)
     for (int x = 0; x < tile.period_x (); x++) {
       const int label = tile.label (x + phase.x, y + phase.y);
-      pattern.push_back (
-          schedule.light (schedule.order ()[std::size_t (label)]));
+      pattern[place++] =
+          schedule.light (schedule.order ()[std::size_t (label)]);
     }
-  centre (pattern);
-  return pattern;
+  return centred (pattern);
 }
 
 /* The light of each zone of a frame. Zones have whole periods, so that a slope
@@ -67,17 +61,16 @@ zones_of (ImageView<const Pixel> frame, Extent period)
   std::vector<Levels> zones;
   for (int j = 0; j < kZones; j++)
     for (int i = 0; i < kZones; i++) {
-      Levels sums (std::size_t (period.width) * std::size_t (period.height));
+      Levels sums = Levels::Zero (period.width * period.height);
       const int x0 = across * i / kZones * period.width;
       const int x1 = across * (i + 1) / kZones * period.width;
       const int y0 = down * j / kZones * period.height;
       const int y1 = down * (j + 1) / kZones * period.height;
       for (int y = y0; y < y1; y++)
         for (int x = x0; x < x1; x++)
-          sums[std::size_t (y % period.height * period.width +
-                            x % period.width)] += double (frame.at (x, y));
-      centre (sums);
-      zones.push_back (std::move (sums));
+          sums[y % period.height * period.width + x % period.width] +=
+              double (frame.at (x, y));
+      zones.push_back (centred (sums));
     }
   return zones;
 }
@@ -92,13 +85,11 @@ Seen
 seen_in (const std::vector<Levels> &zones)
 {
   const double n = double (zones.size ());
-  Seen seen = {Levels (zones.front ().size ()), 0.0};
+  Seen seen = {Levels::Zero (zones.front ().size ()), 0.0};
   for (const Levels &zone : zones)
-    for (std::size_t i = 0; i < zone.size (); i++)
-      seen.mean[i] += zone[i] / n;
+    seen.mean += zone / n;
   for (const Levels &zone : zones)
-    for (std::size_t i = 0; i < zone.size (); i++)
-      seen.variance += std::pow (zone[i] - seen.mean[i], 2);
+    seen.variance += (zone - seen.mean).squaredNorm ();
   /* Rounding adds to the variance even if the zones do not differ. */
   seen.variance = kCorrelated * seen.variance /
                       (n * (n - 1.0) * double (seen.mean.size ())) +
@@ -124,7 +115,7 @@ find_tile_phase (ImageView<const Pixel> frame, const Schedule &schedule)
                  " pixels holds less than " + size_text ({kZones, kZones}) +
                  " periods of the tile; use a smaller tile or larger frames"};
   const Levels flat = pattern_at (schedule, {});
-  if (dot (flat, flat) < 1e-9)
+  if (flat.squaredNorm () < 1e-9)
     return Error{"all elements of the code " + schedule.code ().name () +
                  " get the same light, which does not show the phase of the "
                  "tile; use a frame of a staircase, or calibrate"};
@@ -133,16 +124,16 @@ find_tile_phase (ImageView<const Pixel> frame, const Schedule &schedule)
   TilePhase best;
   double best_likelihood = -1.0;
   std::vector<double> likelihoods;
-  std::set<Levels> known;
+  std::set<std::vector<double>> known;
   for (int y = 0; y < period.height; y++)
     for (int x = 0; x < period.width; x++) {
       const Levels expected = pattern_at (schedule, {x, y});
-      if (!known.insert (expected).second)
+      if (!known.insert ({expected.begin (), expected.end ()}).second)
         continue;
-      const double contrast =
-          std::max (0.0, dot (seen.mean, expected) / dot (expected, expected));
-      const double likelihood = contrast * contrast * dot (expected, expected) /
-                                (2.0 * seen.variance);
+      const double power = expected.squaredNorm ();
+      const double contrast = std::max (0.0, seen.mean.dot (expected) / power);
+      const double likelihood =
+          contrast * contrast * power / (2.0 * seen.variance);
       likelihoods.push_back (likelihood);
       if (likelihood > best_likelihood) {
         best_likelihood = likelihood;

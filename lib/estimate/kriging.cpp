@@ -87,59 +87,49 @@ SparseKriging::SparseKriging (KrigingSystem system, std::vector<TapPair> pairs)
       flat_variance_ (system_.flat.empty () ? 0.0 : kFlatVariance),
       matrix_ (system_.covariance)
 {
-  const std::size_t m = system_.noise.size ();
-  const auto flat = [&] (std::size_t i) {
-    return system_.flat.empty () ? 0.0 : system_.flat[i];
-  };
-  for (std::size_t i = 0; i < m; i++) {
-    for (std::size_t j = i; j < m; j++) {
-      matrix_[i * m + j] += flat_variance_ * flat (i) * flat (j);
-      matrix_[j * m + i] = matrix_[i * m + j];
-    }
-    matrix_[i * m + i] += system_.noise[i];
+  const Index m = Index (system_.noise.size ());
+  Map<MatrixXd> matrix (matrix_.data (), m, m);
+  if (flat_variance_ > 0.0) {
+    const Map<const VectorXd> flat (system_.flat.data (), m);
+    matrix += flat * (flat_variance_ * flat).transpose ();
   }
+  matrix = MatrixXd (matrix.selfadjointView<Eigen::Lower> ());
+  matrix.diagonal () += Map<const VectorXd> (system_.noise.data (), m);
 }
 
 /* Order-recursive least squares: a Cholesky factor that grows by a tap at a
  * time, and what the taps before it leave of each tap and of the target. */
 struct SparseKriging::Search {
-  const std::vector<double> &matrix;
+  const Map<const MatrixXd> matrix;
   std::span<const TapPair> pairs;
-  std::vector<double> target;
-  std::size_t taps;
-  std::vector<double> variances; ///< of each tap
-  std::vector<double> together;  ///< covariances of the taps of each pair
-  std::vector<bool> used;
+  VectorXd target;
+  VectorXd variances;           ///< of each tap
+  std::vector<double> together; ///< covariances of the taps of each pair
+  Eigen::ArrayX<bool> used;
   std::vector<int> chosen;
   std::vector<VectorXd> factor; ///< a column for each chosen tap
   double explained = 0.0;       ///< of the target's variance
 
-  Search (const SparseKriging &kriging, std::vector<double> covariances)
-      : matrix (kriging.matrix_), pairs (kriging.pairs_),
-        target (std::move (covariances)), taps (target.size ()),
-        used (taps, false)
+  Search (const Map<const MatrixXd> &all, std::span<const TapPair> taps,
+      VectorXd covariances)
+      : matrix (all), pairs (taps), target (std::move (covariances)),
+        variances (matrix.diagonal ()),
+        used (Eigen::ArrayX<bool>::Constant (target.size (), false))
   {
-    for (std::size_t i = 0; i < taps; i++)
-      variances.push_back (matrix[i * taps + i]);
     for (const auto &[a, b] : pairs)
-      together.push_back (
-          b < 0 ? 0.0 : matrix[std::size_t (a) * taps + std::size_t (b)]);
+      together.push_back (b < 0 ? 0.0 : matrix (a, b));
   }
 
   double gain (std::size_t pair) const
   {
     const auto alone = [&] (int i) {
-      if (i < 0 || used[std::size_t (i)])
-        return 0.0;
-      const double left = target[std::size_t (i)];
-      return left * left / variances[std::size_t (i)];
+      return i < 0 || used[i] ? 0.0 : target[i] * target[i] / variances[i];
     };
     const auto [a, b] = pairs[pair];
-    if (b < 0 || used[std::size_t (a)] || used[std::size_t (b)])
+    if (b < 0 || used[a] || used[b])
       return alone (a) + alone (b);
-    const double ta = target[std::size_t (a)], tb = target[std::size_t (b)];
-    const double va = variances[std::size_t (a)],
-                 vb = variances[std::size_t (b)], both = together[pair];
+    const double ta = target[a], tb = target[b], va = variances[a],
+                 vb = variances[b], both = together[pair];
     const double determinant = va * vb - both * both;
     return determinant > 1e-12 * va * vb
                ? (vb * ta * ta - 2.0 * both * ta * tb + va * tb * tb) /
@@ -149,24 +139,19 @@ struct SparseKriging::Search {
 
   void add (int tap)
   {
-    const auto i = std::size_t (tap);
-    if (tap < 0 || used[i])
+    if (tap < 0 || used[tap])
       return;
-    used[i] = true;
-    const double left = variances[i];
-    if (left < 1e-9 * matrix[i * taps + i])
+    used[tap] = true;
+    const double left = variances[tap];
+    if (left < 1e-9 * matrix (tap, tap))
       return; // as good as known from the others
-    VectorXd column =
-        Map<const VectorXd> (matrix.data () + i * taps, Index (taps));
+    VectorXd column = matrix.col (tap);
     for (const VectorXd &before : factor)
-      column -= before[Index (i)] * before;
+      column -= before[tap] * before;
     column /= std::sqrt (left);
-    const double along = target[i] / std::sqrt (left);
-    for (std::size_t j = 0; j < taps; j++) {
-      const double g = column[Index (j)];
-      target[j] -= g * along;
-      variances[j] -= g * g;
-    }
+    const double along = target[tap] / std::sqrt (left);
+    target -= along * column;
+    variances -= column.cwiseAbs2 ();
     for (std::size_t p = 0; p < pairs.size (); p++)
       if (pairs[p].second >= 0)
         together[p] -= column[pairs[p].first] * column[pairs[p].second];
@@ -196,39 +181,29 @@ std::vector<double>
 SparseKriging::solve (std::span<const double> target, double flat,
     double variance, double excess) const
 {
-  const std::size_t m = system_.noise.size ();
-  std::vector<double> covariances (target.begin (), target.end ());
+  const Index m = Index (target.size ());
+  const Map<const MatrixXd> matrix (matrix_.data (), m, m);
+  VectorXd sought = Map<const VectorXd> (target.data (), m);
   if (flat_variance_ > 0.0)
-    for (std::size_t i = 0; i < m; i++)
-      covariances[i] += flat_variance_ * flat * system_.flat[i];
-  const Map<const VectorXd> sought (covariances.data (), Index (m));
-  const double all =
-      sought.dot (Map<const MatrixXd> (matrix_.data (), Index (m), Index (m))
-                      .llt ()
-                      .solve (sought));
+    sought +=
+        flat_variance_ * flat * Map<const VectorXd> (system_.flat.data (), m);
+  const double all = sought.dot (matrix.llt ().solve (sought));
   const double error =
       std::max (variance + flat_variance_ * flat * flat - all, 0.0);
-  Search search (*this, covariances);
+  Search search (matrix, pairs_, std::move (sought));
   /* Flat light is kept with one tap at least. */
   while ((search.chosen.empty () || all - search.explained > excess * error) &&
          search.add_best_pair ())
     ;
-  return solve_with (search.chosen, target, flat);
-}
-
-std::vector<double>
-SparseKriging::solve_with (std::span<const int> chosen,
-    std::span<const double> target, double flat) const
-{
-  KrigingSystem part = equations_of (system_, chosen);
-  for (const int tap : chosen)
+  KrigingSystem part = equations_of (system_, search.chosen);
+  for (const int tap : search.chosen)
     part.targets.push_back (target[std::size_t (tap)]);
   if (!part.flat.empty ())
     part.flat_targets = {flat};
   const std::vector<double> solved = solve_kriging (part);
-  std::vector<double> weights (system_.noise.size (), 0.0);
-  for (std::size_t i = 0; i < chosen.size (); i++)
-    weights[std::size_t (chosen[i])] = solved[i];
+  std::vector<double> weights (target.size (), 0.0);
+  for (std::size_t i = 0; i < solved.size (); i++)
+    weights[std::size_t (search.chosen[i])] = solved[i];
   return weights;
 }
 

@@ -77,8 +77,6 @@ public:
 
 private:
   struct Search;
-  std::vector<double> solve_with (std::span<const int> chosen,
-      std::span<const double> target, double flat) const;
 
   KrigingSystem system_;
   std::vector<TapPair> pairs_;

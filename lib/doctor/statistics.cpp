@@ -129,29 +129,10 @@ terms (double u, double v)
   return {1.0, u, v, u * u, u * v, v * v, square * square};
 }
 
-/** Medians of blocks. */
-Image<float>
-blocks_of (ImageView<const float> picture)
-{
-  Image<float> blocks (
-      std::min (kColumns, picture.width), std::min (kRows, picture.height));
-  each_pixel (blocks, [&] (int i, int j) {
-    const int x0 = picture.width * i / blocks.width ();
-    const int x1 = picture.width * (i + 1) / blocks.width ();
-    const int y0 = picture.height * j / blocks.height ();
-    const int y1 = picture.height * (j + 1) / blocks.height ();
-    std::vector<float> values;
-    for (int y = y0; y < y1; y++)
-      values.insert (values.end (), picture.row (y) + x0, picture.row (y) + x1);
-    blocks.at (i, j) = median (std::move (values));
-  });
-  return blocks;
-}
-
 /** Pixels of @p block that are @p good, and of those around it where these are
  * few. */
 std::vector<float>
-good_values (const Image<float> &image, const Rect &block,
+good_values (ImageView<const float> picture, const Rect &block,
     ImageView<const std::uint8_t> good)
 {
   constexpr int kAround = 4 * kSide;
@@ -160,12 +141,12 @@ good_values (const Image<float> &image, const Rect &block,
   std::vector<float> values;
   for (int more = 0; more <= kAround; more += kSide / 2) {
     values.clear ();
-    const int right = std::min (block.x + block.width + more, image.width ());
-    const int below = std::min (block.y + block.height + more, image.height ());
+    const int right = std::min (block.right () + more, picture.width);
+    const int below = std::min (block.bottom () + more, picture.height);
     for (int y = std::max (block.y - more, 0); y < below; y++)
       for (int x = std::max (block.x - more, 0); x < right; x++)
         if (good.width == 0 || good.at (x, y) != 0)
-          values.push_back (image.at (x, y));
+          values.push_back (picture.at (x, y));
     if (values.size () >= enough)
       return values;
   }
@@ -184,6 +165,21 @@ flattened (const Image<float> &light, ImageView<const std::uint8_t> good)
     return terms ((2 * x + 1.0) / width - 1.0, (2 * y + 1.0) / height - 1.0);
   };
   const int step = std::max (1, width / kPlaces);
+/** Of the good values of each of @p columns x @p rows blocks. */
+Image<float>
+medians_of (ImageView<const float> picture, int columns, int rows,
+    ImageView<const std::uint8_t> good = {})
+{
+  Image<float> medians (columns, rows);
+  each_pixel (medians, [&] (int i, int j) {
+    const int x = picture.width * i / columns, y = picture.height * j / rows;
+    const Rect block{x, y, picture.width * (i + 1) / columns - x,
+        picture.height * (j + 1) / rows - y};
+    medians.at (i, j) = median (good_values (picture, block, good));
+  });
+  return medians;
+}
+
   MatrixXd normal = MatrixXd::Zero (7, 7);
   VectorXd right = VectorXd::Zero (7);
   double sum = 0.0, count = 0.0;
@@ -215,13 +211,7 @@ smooth (const Image<float> &image, ImageView<const std::uint8_t> good)
   const int rows = std::max (1, image.height () / kSide);
   const double wide = double (image.width ()) / columns;
   const double high = double (image.height ()) / rows;
-  Image<float> medians (columns, rows);
-  each_pixel (medians, [&] (int i, int j) {
-    const Rect block{int (i * wide), int (j * high),
-        int ((i + 1) * wide) - int (i * wide),
-        int ((j + 1) * high) - int (j * high)};
-    medians.at (i, j) = median (good_values (image, block, good));
-  });
+  const Image<float> medians = medians_of (image.view (), columns, rows, good);
   const auto place = [] (double at, int count) {
     const int low =
         std::clamp (int (std::floor (at)), 0, std::max (0, count - 2));
@@ -244,12 +234,10 @@ smooth (const Image<float> &image, ImageView<const std::uint8_t> good)
 Measured
 corner_loss (ImageView<const float> picture)
 {
-  const Image<float> blocks = blocks_of (picture);
-  std::vector<float> lights;
-  each_pixel (
-      blocks, [&] (int i, int j) { lights.push_back (blocks.at (i, j)); });
-  const float dark = float (kNoMirrors) * quantile (lights, kBright);
-  MatrixXd a (Index (lights.size ()), 7);
+  const Image<float> blocks = medians_of (picture,
+      std::min (kColumns, picture.width), std::min (kRows, picture.height));
+  const float dark = float (kNoMirrors) * quantile (blocks.pixels (), kBright);
+  MatrixXd a (Index (blocks.pixels ().size ()), 7);
   VectorXd b (a.rows ()), weights = VectorXd::Ones (a.rows ());
   each_pixel (blocks, [&] (int i, int j) {
     const Index at = Index (j) * blocks.width () + i;

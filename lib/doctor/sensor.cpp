@@ -64,7 +64,9 @@ constexpr double kFewDefects = 40;
 
 struct Level {
   int slots = 0;
-  Stack stack;
+  Nanoseconds time = 0;
+  double scatter = 0.0; // of the mean of the frames, DN
+  std::uint16_t bits_seen = 0;
   StackMeans means;
 };
 
@@ -178,12 +180,12 @@ PhotonTransferRun::see_levels ()
     const int slots = std::max (1, int (std::lround (kLevels[i] * top_)));
     if (std::ranges::find (levels_, slots, &Level::slots) != levels_.end ())
       continue;
-    ASSIGN_OR_RETURN (
-        Stack stack, look_at_light (examination_, lit (fine_.first, slots),
-                         fine_.of, kFrames, &dark_.mean));
-    const StackMeans means = means_of (stack, defects_.good.view ());
-    levels_.push_back ({slots, std::move (stack), means});
-    levels_.back ().stack.drop_pictures ();
+    ASSIGN_OR_RETURN (const Stack stack,
+        look_at_light (examination_, lit (fine_.first, slots), fine_.of,
+            kFrames, &dark_.mean));
+    levels_.push_back (
+        {slots, stack.time, stack.scatter / std::sqrt (stack.frames),
+            stack.bits_seen, means_of (stack, defects_.good.view ())});
   }
   RETURN_IF_ERROR (see_reference ());
   std::ranges::sort (levels_, {}, &Level::slots);
@@ -267,8 +269,8 @@ PhotonTransferRun::points (std::optional<double> leak) const
     add (dark_means_, leak_slots, 0.0);
   for (const Level &level : levels_)
     if (!plateau_ || level.means.mean < 0.9 * *plateau_)
-      add (level.means, level.slots * drift_at (level.stack.time) + leak_slots,
-          level.stack.scatter / std::sqrt (level.stack.frames));
+      add (level.means, level.slots * drift_at (level.time) + leak_slots,
+          level.scatter);
   if (dithered_)
     all.push_back ({0.0, {dithered_->black.value, kDarkError}});
   else if (leak)
@@ -312,7 +314,7 @@ PhotonTransferRun::missing_bits () const
 {
   std::uint16_t seen = dark_.bits_seen;
   for (const Level &level : levels_)
-    seen = std::uint16_t (seen | level.stack.bits_seen);
+    seen = std::uint16_t (seen | level.bits_seen);
   return seen == 0 ? 0 : std::countr_zero (seen);
 }
 

@@ -25,15 +25,6 @@ struct Stack {
   Image<std::uint8_t> zeros, full;
   std::uint16_t bits_seen = 0; ///< that are set in a pixel of a frame
   double scatter = 0.0;        ///< rms of the means of frames, DN
-
-  /** Gives the memory of the images back. */
-  void drop_pictures ()
-  {
-    mean = {};
-    variance = {};
-    zeros = {};
-    full = {};
-  }
 };
 
 /**

@@ -65,18 +65,6 @@ variance_between (const SeenFrame &a, const SeenFrame &b)
   return 0.5 * (squares - sum * sum / pixels) / pixels;
 }
 
-Measured
-mean_with_error (const std::vector<double> &values)
-{
-  const double count = double (values.size ());
-  double mean = 0.0, squares = 0.0;
-  for (const double value : values)
-    mean += value / count;
-  for (const double value : values)
-    squares += (value - mean) * (value - mean);
-  return {mean, std::sqrt (squares / count / std::max (1.0, count - 1.0))};
-}
-
 class ResponseRun
 {
 public:
@@ -163,15 +151,14 @@ ResponseRun::compare (const Part &part)
         return kNotMeasured;
       lights[i].push_back (light (looks_.size () - 1));
     }
-  const Measured first = mean_with_error (lights[0]);
-  const Measured whole = mean_with_error (lights[1]);
-  const Measured second = mean_with_error (lights[2]);
+  const Measured first = spread_of (lights[0]);
+  const Measured whole = spread_of (lights[1]);
+  const Measured second = spread_of (lights[2]);
   if (whole.value < kFaint * largest_)
     return kNotMeasured;
   /* Of light that flickers, few looks tell the mean badly, and the halves
    * differ. */
-  const double sigma = std::sqrt (double (kRounds)) *
-                       std::hypot (first.sigma, whole.sigma, second.sigma);
+  const double sigma = std::hypot (first.sigma, whole.sigma, second.sigma);
   return Measured{(first.value + second.value) / whole.value - 1.0,
       std::hypot (sigma, first.value - second.value) / whole.value};
 }
@@ -190,9 +177,8 @@ ResponseRun::is_steady ()
       return false;
     lights.push_back (light (looks_.size () - 1));
   }
-  const Measured again = mean_with_error (lights);
-  return again.sigma * std::sqrt (double (kAgain)) <
-         std::abs (excess_.value) / kSigmas * again.value;
+  const Measured again = spread_of (lights);
+  return again.sigma < std::abs (excess_.value) / kSigmas * again.value;
 }
 
 /** Whether frames with more light than those before were brighter at first than
@@ -379,7 +365,8 @@ row_delay (
     }
     angles.push_back (std::arg (last * std::conj (first)));
   }
-  const Measured angle = mean_with_error (angles);
+  Measured angle = spread_of (angles);
+  angle.sigma /= std::sqrt (double (frames));
   /* The middles of the quarters are 3/4 of the frame apart. */
   return scaled (angle, period / (2.0 * pi) / 0.75);
 }

@@ -38,6 +38,18 @@ index_of (const std::vector<int> &counts, double part)
 
 } // namespace
 
+Measured
+spread_of (const std::vector<double> &values)
+{
+  const double count = std::max (1.0, double (values.size ()));
+  double mean = 0.0, squares = 0.0;
+  for (const double value : values)
+    mean += value / count;
+  for (const double value : values)
+    squares += (value - mean) * (value - mean);
+  return {mean, std::sqrt (squares / std::max (1.0, count - 1.0))};
+}
+
 Level
 level_of (ImageView<const std::uint16_t> picture, int largest)
 {
@@ -153,18 +165,6 @@ good_values (ImageView<const float> picture, const Rect &block,
   return values.empty () ? std::vector{0.0f} : values;
 }
 
-} // namespace
-
-Image<float>
-flattened (const Image<float> &light, ImageView<const std::uint8_t> good)
-{
-  constexpr int kPlaces = 128;    // in a row, at which the surface is fitted
-  constexpr double kLeast = 0.05; // of its light, where there is none
-  const int width = light.width (), height = light.height ();
-  const auto terms_at = [&] (int x, int y) {
-    return terms ((2 * x + 1.0) / width - 1.0, (2 * y + 1.0) / height - 1.0);
-  };
-  const int step = std::max (1, width / kPlaces);
 /** Of the good values of each of @p columns x @p rows blocks. */
 Image<float>
 medians_of (ImageView<const float> picture, int columns, int rows,
@@ -180,6 +180,18 @@ medians_of (ImageView<const float> picture, int columns, int rows,
   return medians;
 }
 
+} // namespace
+
+Image<float>
+flattened (const Image<float> &light, ImageView<const std::uint8_t> good)
+{
+  constexpr int kPlaces = 128;    // in a row, at which the surface is fitted
+  constexpr double kLeast = 0.05; // of its light, where there is none
+  const int width = light.width (), height = light.height ();
+  const auto terms_at = [&] (int x, int y) {
+    return terms ((2 * x + 1.0) / width - 1.0, (2 * y + 1.0) / height - 1.0);
+  };
+  const int step = std::max (1, width / kPlaces);
   MatrixXd normal = MatrixXd::Zero (7, 7);
   VectorXd right = VectorXd::Zero (7);
   double sum = 0.0, count = 0.0;

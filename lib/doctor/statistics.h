@@ -3,12 +3,16 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "base/image.h"
 #include "setup/bench_profile.h"
 
 namespace codedexposure
 {
+
+/** The mean of @p values and their standard deviation; 0 without values. */
+Measured spread_of (const std::vector<double> &values);
 
 /** The pixel values (DN) of a picture as a whole. */
 struct Level {

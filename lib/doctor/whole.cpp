@@ -11,6 +11,7 @@
 #include "base/try.h"
 #include "doctor/checks.h"
 #include "doctor/stack.h"
+#include "doctor/statistics.h"
 #include "estimate/least_squares.h"
 #include "estimate/mirror_share.h"
 #include "schedule/mirror_array.h"
@@ -34,19 +35,6 @@ constexpr double kJitterWarn = 0.2;
 /* Light that changes by that part is of another part of the cycle. */
 constexpr double kOtherSlot = 0.3;
 constexpr double kLongestWatch = 10.0; // s
-
-/** Mean and standard deviation of numbers. */
-Measured
-spread_of (const std::vector<double> &values)
-{
-  const double count = double (values.size ());
-  double mean = 0.0, squares = 0.0;
-  for (const double value : values)
-    mean += value / std::max (1.0, count);
-  for (const double value : values)
-    squares += (value - mean) * (value - mean);
-  return {mean, std::sqrt (squares / std::max (1.0, count - 1.0))};
-}
 
 /** How often an exposure of half of a period saw another part of the cycle than
  * the first one, in @p seconds at most, where the second quarter is lit. A

@@ -85,8 +85,7 @@ fit_gray_codes (const GrayCode &gx, const GrayCode &gy,
     const auto step = fit.solve (round <= 4 ? 6 : 8, false);
     if (!step)
       return lost;
-    for (std::size_t i = 0; i < 8; i++)
-      h[i] += step->change[i];
+    Eigen::Map<Eigen::Vector<double, 8>> (h.data ()) += step->change.head<8> ();
     if (round > 0)
       limit =
           std::max (1.5 * stripe, 1.5 * std::sqrt (squares / double (agree)));

@@ -3,9 +3,9 @@
  * only. */
 #pragma once
 
-#include <array>
-#include <cstddef>
 #include <optional>
+
+#include <Eigen/Core>
 
 #include "mapping/mapping.h"
 
@@ -19,8 +19,10 @@ namespace codedexposure
 class HomographyFit
 {
 public:
-  static constexpr std::size_t kExtra = 8; ///< index of the one for x
-  static constexpr std::size_t kNumbers = 10;
+  static constexpr int kExtra = 8; ///< index of the one for x
+  static constexpr int kNumbers = 10;
+  using Numbers = Eigen::Vector<double, kNumbers>;
+  using Square = Eigen::Matrix<double, kNumbers, kNumbers>;
 
   /** Likelihood of the mirror of one pixel along one axis. */
   struct Observation {
@@ -40,17 +42,17 @@ public:
    * homography are free (6: affine, 8: all), and the extra ones if @p extra.
    * None if the observations do not determine them. */
   struct Step {
-    std::array<double, kNumbers> change = {};
-    std::array<double, kNumbers *kNumbers> covariance = {};
+    Numbers change = Numbers::Zero ();
+    Square covariance = Square::Zero ();
   };
-  std::optional<Step> solve (std::size_t numbers, bool extra) const;
+  std::optional<Step> solve (int numbers, bool extra) const;
 
 private:
-  void add_axis (std::size_t first, double mirror, double xi, double eta,
-      double z, const Observation &seen);
+  void add_axis (int first, double mirror, double xi, double eta, double z,
+      const Observation &seen);
 
-  std::array<double, kNumbers *kNumbers> normal_ = {}; // lower triangle
-  std::array<double, kNumbers> right_ = {};
+  Square normal_ = Square::Zero (); // lower triangle
+  Numbers right_ = Numbers::Zero ();
 };
 
 } // namespace codedexposure

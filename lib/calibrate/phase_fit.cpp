@@ -406,7 +406,7 @@ PhaseFit::block_at (std::vector<Block> &blocks, int px, int py) const
 }
 
 std::optional<double>
-PhaseFit::round (std::size_t numbers)
+PhaseFit::round (int numbers)
 {
   const auto blocks = std::size_t (blocks_across () * blocks_down ());
   blocks_x.assign (blocks, {});
@@ -425,14 +425,14 @@ PhaseFit::round (std::size_t numbers)
   blur_y = moved (blur_y, step->change[HomographyFit::kExtra + 1]);
   if (numbers == 0)
     return 0.0;
-  for (std::size_t i = 0; i < Mapping::kParameters; i++)
-    for (std::size_t j = 0; j < Mapping::kParameters; j++)
-      covariance[i * Mapping::kParameters + j] =
-          noise_ratio * step->covariance[i * HomographyFit::kNumbers + j];
+  constexpr int kParameters = Mapping::kParameters;
+  Eigen::Map<Eigen::Matrix<double, kParameters, kParameters>> (
+      covariance.data ()) =
+      noise_ratio * step->covariance.topLeftCorner<kParameters, kParameters> ();
   const Homography before = mapping.centred ();
   Homography next = before;
-  for (std::size_t i = 0; i < numbers; i++)
-    next[i] += step->change[i];
+  for (int i = 0; i < numbers; i++)
+    next[std::size_t (i)] += step->change[i];
   auto made = Mapping::from_centred (camera, mirrors, next);
   if (!made)
     return std::nullopt;

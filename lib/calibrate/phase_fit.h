@@ -97,7 +97,7 @@ struct PhaseFit {
    * mapping loses its displacement. Returns the largest step of the frame's
    * corners in mirrors; none if the frames do not determine a step.
    */
-  std::optional<double> round (std::size_t numbers);
+  std::optional<double> round (int numbers);
   /** Fits the noise to the residuals of a part of the rows. */
   void estimate_noise ();
 };

@@ -148,9 +148,9 @@ struct PixelLight {
   float dark, swing;
 };
 
-/* Fits pixel @x of row @rows to the frames of one axis. */
+/* Fits pixel @x of a row, as of rows_at (), to the frames of one axis. */
 PixelFit
-fit_pixel (const float *const *rows, int x, const GratingResponse &response,
+fit_pixel (const Image<float> &rows, int x, const GratingResponse &response,
     double mirror, PixelLight light, const NoiseModel &noise,
     const Rounding &rounding)
 {
@@ -163,7 +163,7 @@ fit_pixel (const float *const *rows, int x, const GratingResponse &response,
     const Value v = response.at (entry, k);
     const float expected = light.dark + light.swing * v.light;
     const float variance = floor + slope * std::max (0.0f, expected);
-    sums.add (v, rows[k][x] - rounding.mean (expected), 1.0f / variance);
+    sums.add (v, rows.at (x, k) - rounding.mean (expected), 1.0f / variance);
   }
   return sums.fit (light.swing + sums.more_swing ());
 }
@@ -215,7 +215,7 @@ NoiseBins::fit (NoiseModel model) const
 /* Adds the residuals of one pixel, whose level, swing and place are fitted.
  * Each is corrected for its own influence on the fit. */
 void
-find_noise (const float *const *rows, int x, const GratingResponse &response,
+find_noise (const Image<float> &rows, int x, const GratingResponse &response,
     double mirror, PixelLight light, const NoiseModel &noise, NoiseBins &bins)
 {
   constexpr std::size_t kTerms = 3;
@@ -227,7 +227,7 @@ find_noise (const float *const *rows, int x, const GratingResponse &response,
     const Value v = response.at (entry, int (k));
     expected[k] = double (light.dark) + double (light.swing) * double (v.light);
     weight[k] = 1.0 / (noise.floor + noise.slope * std::max (0.0, expected[k]));
-    rest[k] = double (rows[k][x]) - expected[k];
+    rest[k] = double (rows.at (x, int (k))) - expected[k];
     term[0][k] = 1.0;
     term[1][k] = double (v.light);
     term[2][k] = double (v.slope);
@@ -260,26 +260,18 @@ find_noise (const float *const *rows, int x, const GratingResponse &response,
       bins.add (expected[k], rest[k] * rest[k] / freedom[k]);
 }
 
-/** Row @p y of the camera in each frame, DN. */
-class Rows
+/** Row @p y of the camera in each frame, one below the other, DN. */
+Image<float>
+rows_at (const PhaseStack &stack, int y)
 {
-public:
-  Rows (const PhaseStack &stack, int y)
-  {
-    for (const auto &frame : stack.frames) {
-      std::vector<float> &row = rows_.emplace_back (
-          frame.row (y / stack.step), frame.row (y / stack.step) + frame.width);
-      for (float &value : row)
-        value *= stack.unit;
-      starts_.push_back (row.data ());
-    }
-  }
-  const float *const *data () const { return starts_.data (); }
-
-private:
-  std::vector<std::vector<float>> rows_;
-  std::vector<const float *> starts_;
-};
+  Image<float> rows (stack.frames[0].width, stack.period ());
+  for (int k = 0; k < stack.period (); k++)
+    std::transform (stack.frames[std::size_t (k)].row (y / stack.step),
+        stack.frames[std::size_t (k)].row (y / stack.step) + rows.width (),
+        rows.view ().row (k),
+        [&stack] (std::uint16_t value) { return stack.unit * float (value); });
+  return rows;
+}
 
 /* Constants of all pixels of a round. */
 struct Conditions {
@@ -366,7 +358,7 @@ sum_up (PhaseFit &p)
   const Rounding rounding (p.noise, p.frames);
   PhaseSums sums;
   for (int y = 0; y < p.camera.height; y += p.x.step) {
-    const Rows rows_x (p.x, y), rows_y (p.y, y);
+    const Image<float> rows_x = rows_at (p.x, y), rows_y = rows_at (p.y, y);
     for (int x = 0; x < p.camera.width; x++) {
       const Position m = p.mapping.mirror_at (x, y);
       if (p.usable.at (x, y) == 0 || at.sees_edge (m, p.mirrors))
@@ -374,9 +366,9 @@ sum_up (PhaseFit &p)
       const float low = p.dark.at (x, y);
       const PixelLight light = {low, p.white.at (x, y) - low};
       const auto fx =
-          fit_pixel (rows_x.data (), x, at.x, m.x, light, p.noise, rounding);
+          fit_pixel (rows_x, x, at.x, m.x, light, p.noise, rounding);
       const auto fy =
-          fit_pixel (rows_y.data (), x, at.y, m.y, light, p.noise, rounding);
+          fit_pixel (rows_y, x, at.y, m.y, light, p.noise, rounding);
       if (std::min (fx.swing, fy.swing) < kFaintSwing * light.swing) {
         p.faint.at (x, y) = 1;
       } else if (fx.chi_square > at.limit_x || fy.chi_square > at.limit_y) {
@@ -453,7 +445,7 @@ PhaseFit::estimate_noise ()
 
   for (int py = 0; py < camera.height; py += std::lcm (4, x.step))
     for (const bool along_y : {false, true}) {
-      const Rows rows (along_y ? y : x, py);
+      const Image<float> rows = rows_at (along_y ? y : x, py);
       for (int px = 0; px < camera.width; px++) {
         if (usable.at (px, py) == 0 || outlier.at (px, py) != 0 ||
             faint.at (px, py) != 0)
@@ -462,8 +454,8 @@ PhaseFit::estimate_noise ()
         if (at.sees_edge (m, mirrors))
           continue;
         const float low = dark.at (px, py);
-        find_noise (rows.data (), px, along_y ? at.y : at.x,
-            along_y ? m.y : m.x, {low, white.at (px, py) - low}, noise, bins);
+        find_noise (rows, px, along_y ? at.y : at.x, along_y ? m.y : m.x,
+            {low, white.at (px, py) - low}, noise, bins);
       }
     }
   noise = bins.fit (noise);

@@ -48,44 +48,37 @@ power_at (int harmonic, int period, Light light)
   return std::norm (sum) * 4.0 / (double (period) * period);
 }
 
-/* What a grating gives at each blur, for light of 1. */
-class Expected
-{
-public:
-  Expected (int period, double side);
+/* What a grating gives at a blur, for light of 1. */
+struct Expected {
+  double variance; // mirrors squared
+  std::array<Powers, kPlaces> powers;
 
-  struct Entry {
-    double variance; // mirrors squared
-    std::array<Powers, kPlaces> powers;
-
-    Powers at (const Places &places) const
-    {
-      Powers sum = {};
-      for (std::size_t i = 0; i < kPlaces; i++)
-        for (std::size_t h = 0; h < kTerms; h++)
-          sum[h] += places[i] * powers[i][h];
-      return sum;
-    }
-  };
-  const std::vector<Entry> &entries () const { return entries_; }
-
-private:
-  std::vector<Entry> entries_;
+  Powers at (const Places &places) const
+  {
+    Powers sum = {};
+    for (std::size_t i = 0; i < kPlaces; i++)
+      for (std::size_t h = 0; h < kTerms; h++)
+        sum[h] += places[i] * powers[i][h];
+    return sum;
+  }
 };
 
-Expected::Expected (int period, double side)
+/* The same at growing blurs. */
+std::vector<Expected>
+expected_of (int period, double side)
 {
+  std::vector<Expected> all;
   for (double sigma = 0.05; sigma < 0.75 * period; sigma *= 1.06) {
     const GratingResponse response (period, side, sigma);
-    Entry entry = {sigma * sigma, {}};
+    Expected &entry = all.emplace_back (Expected{sigma * sigma, {}});
     for (std::size_t i = 0; i < kPlaces; i++) {
       const auto at = response.entry ((double (i) + 0.5) / kPlaces);
       for (std::size_t h = 0; h < kTerms; h++)
         entry.powers[i][h] = power_at (kHarmonics[h], period,
             [&] (int k) { return double (response.at (at, k).light); });
     }
-    entries_.push_back (entry);
   }
+  return all;
 }
 
 /* Means over the pixels of a block. */
@@ -150,9 +143,8 @@ powers_of (Axis axis, const GratingStack &stack,
 
 /* The blur whose harmonics fit best: variance in mirrors squared. */
 Measured
-variance_of (const BlockPowers &seen, const Expected &expected)
+variance_of (const BlockPowers &seen, const std::vector<Expected> &entries)
 {
-  const auto &entries = expected.entries ();
   std::vector<double> misfits;
   std::array<double, kTerms> weights;
   for (std::size_t h = 0; h < kTerms; h++) {
@@ -164,7 +156,7 @@ variance_of (const BlockPowers &seen, const Expected &expected)
     weights[h] = 1.0 / std::max (1e-12, error);
   }
   const double swing_weight = 1.0 / std::pow (kSwingError * seen.swing, 2.0);
-  for (const Expected::Entry &entry : entries) {
+  for (const Expected &entry : entries) {
     double pp = swing_weight, ps = swing_weight * seen.swing;
     double ss = swing_weight * seen.swing * seen.swing;
     const Powers powers = entry.at (seen.places);
@@ -209,8 +201,8 @@ map_blur (const GratingStack &stack, ImageView<const std::uint8_t> good,
   map.variance = Image<float> (std::max (1, good.width / map.block),
       std::max (1, good.height / map.block));
   map.sigma = map.variance;
-  const Expected of_x (int (stack.x.size ()), 1.0 / magnification);
-  const Expected of_y (int (stack.y.size ()), 1.0 / magnification);
+  const auto of_x = expected_of (int (stack.x.size ()), 1.0 / magnification);
+  const auto of_y = expected_of (int (stack.y.size ()), 1.0 / magnification);
   const double scale = magnification * magnification;
   each_pixel (map.variance, [&] (int i, int j) {
     const Rect block = {i * map.block, j * map.block,

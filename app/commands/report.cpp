@@ -48,7 +48,6 @@ public:
 private:
   void check_end (const RunResult &result);
   std::size_t choose_frame (const Measurement &all) const;
-  PlayTimes times_of (const Measurement &all, std::size_t shown) const;
   /** What is written of the frame that is shown. */
   enum class Kind { split, fused, sum };
   void write_pictures (const PageFolder &folder, const ReportPage &page,
@@ -172,17 +171,6 @@ Report::choose_frame (const Measurement &all) const
   return best;
 }
 
-PlayTimes
-Report::times_of (const Measurement &all, std::size_t shown) const
-{
-  const auto &coded = all.coded.pictures;
-  PlayTimes times;
-  times.start = coded[shown].pts;
-  if (shown + 1 < coded.size ())
-    times.stop = coded[shown + 1].pts;
-  return times;
-}
-
 void
 Report::write_pictures (const PageFolder &folder, const ReportPage &page,
     const PlayTimes &times, bool salvage, Kind kind)
@@ -241,7 +229,9 @@ Report::run ()
     fail ("no subframe of " + recording_ + " could be decoded");
   const std::size_t shown = choose_frame (all);
   options.coded_csv = options.subframes_csv = "";
-  options.times = times_of (all, shown);
+  options.times.start = all.coded.pictures[shown].pts;
+  if (shown + 1 < all.coded.pictures.size ())
+    options.times.stop = all.coded.pictures[shown + 1].pts;
   options.details = true;
   const Measurement frame = measure (options);
   check_end (frame.result);

@@ -125,11 +125,9 @@ public:
   Rig *second () override { return second_.get (); }
 
 private:
-  Result<void> open_second ();
   Result<void> make_pipeline ();
   std::string close_pipeline ();
   Result<void> start ();
-  Result<void> reopen_dmd ();
   void read_features (ArvCamera *camera);
   void read_dmd ();
   void forget_frames ();
@@ -258,12 +256,6 @@ CameraRig::open ()
     return Error{"aravissrc has no camera", ErrorCode::not_found};
   read_features (camera.get ());
   options_.plan.size = parts_.camera.size;
-  return open_second ();
-}
-
-Result<void>
-CameraRig::open_second ()
-{
   if (!options_.second)
     return {};
   CameraRigOptions options{*options_.second, options_.plan};
@@ -281,7 +273,9 @@ CameraRig::show (const StillMask &mask, int slots)
     ASSIGN_OR_RETURN (const StillMask other, mask_for_second (mask, slots));
     return first_->show (other, slots);
   }
-  RETURN_IF_ERROR (reopen_dmd ());
+  if (!dmd_) {
+    ASSIGN_OR_RETURN (dmd_, open_dmd (*options_.source.device));
+  }
   ASSIGN_OR_RETURN (
       const SlotPlan plan, SlotPlan::fit ({}, slots, parts_.rate));
   /* Not later: the first frames of this mask may be here when show () returns,
@@ -497,15 +491,6 @@ CameraRig::record (const Schedule &, double seconds,
     take (frame);
     frames += 1.0 + double (frame.lost_before);
   }
-  return {};
-}
-
-Result<void>
-CameraRig::reopen_dmd ()
-{
-  if (dmd_)
-    return {};
-  ASSIGN_OR_RETURN (dmd_, open_dmd (*options_.source.device));
   return {};
 }
 

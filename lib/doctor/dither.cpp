@@ -71,8 +71,7 @@ private:
     double length;               // of the light
     bool longer;
   };
-  std::vector<DitherGroup> groups (double off) const;
-  void group (
+  void add_groups (
       std::size_t look, double off, std::vector<DitherGroup> &all) const;
 
   Examination &examination_;
@@ -133,7 +132,7 @@ DitherRun::look (bool longer)
 }
 
 void
-DitherRun::group (
+DitherRun::add_groups (
     std::size_t look, double off, std::vector<DitherGroup> &all) const
 {
   const Look &seen = looks_[look];
@@ -171,15 +170,6 @@ DitherRun::group (
   }
 }
 
-std::vector<DitherGroup>
-DitherRun::groups (double off) const
-{
-  std::vector<DitherGroup> all;
-  for (std::size_t look = 0; look < looks_.size (); look++)
-    group (look, off, all);
-  return all;
-}
-
 /* Which pixels get the same light depends on the off light. */
 std::optional<Dark>
 DitherRun::fit () const
@@ -187,9 +177,11 @@ DitherRun::fit () const
   std::optional<Dark> dark;
   for (int round = 0; round < 3; round++) {
     const double off = dark ? std::max (0.0, dark->off.value) : 0.0;
-    const auto next =
-        fit_dither (groups (off), part_, transfer_.conversion_gain,
-            dark ? std::optional<double> (off) : std::nullopt);
+    std::vector<DitherGroup> groups;
+    for (std::size_t look = 0; look < looks_.size (); look++)
+      add_groups (look, off, groups);
+    const auto next = fit_dither (groups, part_, transfer_.conversion_gain,
+        dark ? std::optional<double> (off) : std::nullopt);
     if (!next)
       break;
     dark = next;

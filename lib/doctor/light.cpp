@@ -46,7 +46,6 @@ public:
 private:
   bool judge_level (const Stack &all, const Stack &dark);
   void judge_time ();
-  Result<Verdict> judge_pulses ();
   void judge_flicker (const LightFit &fit);
   Result<void> judge_target (const Stack &all, const Stack &dark);
   Result<void> judge_field (const Stack &all, const Stack &dark);
@@ -141,13 +140,6 @@ LightCheck::judge_time ()
     std::ranges::rotate (finding_.diagnoses, finding_.diagnoses.end () - 1);
 }
 
-Result<Verdict>
-LightCheck::judge_pulses ()
-{
-  ASSIGN_OR_RETURN (const Measured light, measure_pulses (examination_));
-  return finding_.measure ("light of a pulse", scaled (light, 1e6));
-}
-
 /** What is not even may also move, slowly. */
 Result<void>
 LightCheck::judge_target (const Stack &all, const Stack &dark)
@@ -202,9 +194,10 @@ LightCheck::run ()
   ASSIGN_OR_RETURN (const Stack all, std::move (sum).stack (&dark.mean));
   if (!judge_level (all, dark))
     return std::move (finding_);
-  ASSIGN_OR_RETURN (const Verdict pulses, judge_pulses ());
+  ASSIGN_OR_RETURN (const Measured pulse, measure_pulses (examination_));
   /* Pulses make lines where there are none. */
-  if (pulses < Verdict::warn)
+  if (finding_.measure ("light of a pulse", scaled (pulse, 1e6)) <
+      Verdict::warn)
     judge_time ();
   const bool ill = finding_.is_ill ();
   /* Light that falls off steeply looks like texture in small pictures. */

@@ -51,7 +51,6 @@ private:
   Result<void> show_patterns ();
   Result<void> keep (const Pattern &pattern, const SeenFrame &frame);
   void keep (const Pattern &pattern, Image<float> mean);
-  Result<void> look_for_mirrors ();
   void measure_mapping ();
   void measure_blur ();
   double modulation () const;
@@ -127,19 +126,6 @@ OpticsRun::show_patterns ()
       sum /= frames;
     keep (pattern, std::move (mean));
   }
-  return {};
-}
-
-/* Roughly, where the patterns give no mapping. */
-Result<void>
-OpticsRun::look_for_mirrors ()
-{
-  const auto view = look_where (
-      examination_, stack_.dark, stack_.white, defects_.good.view ());
-  if (view)
-    view_ = *view;
-  else if (view.error ().code != ErrorCode::invalid_argument)
-    return view.error ();
   return {};
 }
 
@@ -318,8 +304,8 @@ void
 OpticsRun::diagnose_no_mapping (const Error &why)
 {
   const float largest = float (examination_.rig.parts ().largest ());
-  const double full = double (std::ranges::count_if (stack_.white.pixels (),
-      [&] (float light) { return light >= largest; }));
+  const double full = double (std::ranges::count_if (
+      stack_.white.pixels (), [&] (float light) { return light >= largest; }));
   const double part = full / camera_.width / camera_.height;
   if (part > 0.3)
     return finding_.blame ("bright", fixed (100 * part, 0) +
@@ -383,10 +369,14 @@ OpticsRun::run ()
   calibration_.reset (); // most of the memory
   defects_ = find_defects (
       stack_.dark, stack_.white, examination_.rig.parts ().largest ());
-  if (result_)
+  if (result_) {
     measure_mapping ();
-  else
-    RETURN_IF_ERROR (look_for_mirrors ());
+  } else if (const auto view = look_where (examination_, stack_.dark,
+                 stack_.white, defects_.good.view ())) {
+    view_ = *view; // roughly
+  } else if (view.error ().code != ErrorCode::invalid_argument) {
+    return view.error ();
+  }
   measure_blur ();
   if (result_)
     diagnose_blur ();

@@ -86,7 +86,6 @@ private:
   Result<void> compare_exposures ();
   Result<void> measure_light ();
   Result<void> look_at_pixels ();
-  Result<void> look_at_optics ();
   void compare_views (const Mapping &of_second);
   void take_over (Finding finding);
 
@@ -436,16 +435,6 @@ SecondRun::look_at_pixels ()
   return {};
 }
 
-Result<void>
-SecondRun::look_at_optics ()
-{
-  ASSIGN_OR_RETURN (Finding optics, check_optics (other_));
-  take_over (std::move (optics));
-  if (other_.profile.mapping)
-    compare_views (*other_.profile.mapping);
-  return {};
-}
-
 Result<Finding>
 SecondRun::run ()
 {
@@ -463,7 +452,10 @@ SecondRun::run ()
     }
   }
   RETURN_IF_ERROR (compare_exposures ());
-  RETURN_IF_ERROR (look_at_optics ());
+  ASSIGN_OR_RETURN (Finding optics, check_optics (other_));
+  take_over (std::move (optics));
+  if (other_.profile.mapping)
+    compare_views (*other_.profile.mapping);
   /* No recording of this camera follows, in which a few would be seen. */
   const Reading *missing = finding_.reading ("second camera: missing frames");
   if (missing && missing->number.value > 0.0)

@@ -76,18 +76,6 @@ struct Recording {
 };
 
 void
-count (const RecordedFrame &frame, Recording &counts)
-{
-  counts.frames++;
-  counts.lost += frame.lost_before;
-  counts.damaged += frame.damaged;
-  counts.unsynchronised += frame.synchronised == false;
-  counts.delays.push_back (double (frame.arrival - frame.time));
-  if (frame.uncertainty)
-    counts.uncertainty = frame.uncertainty;
-}
-
-void
 diagnose_losses (const Recording &counts, Finding &finding)
 {
   const double root = std::sqrt (double (counts.lost));
@@ -363,7 +351,13 @@ check_whole (Examination &examination)
         if (!frame.damaged && frame.synchronised != false &&
             counts.frames % every == every / 2)
           slots.add (frame.picture);
-        count (frame, counts);
+        counts.frames++;
+        counts.lost += frame.lost_before;
+        counts.damaged += frame.damaged;
+        counts.unsynchronised += frame.synchronised == false;
+        counts.delays.push_back (double (frame.arrival - frame.time));
+        if (frame.uncertainty)
+          counts.uncertainty = frame.uncertainty;
       }));
   diagnose_losses (counts, finding);
   if (counts.frames < kFewest) {

@@ -78,13 +78,9 @@ check_numbers (std::string_view text, const Pattern &p)
 Result<Pattern>
 Pattern::parse (std::string_view text)
 {
+  if (text == "dark" || text == "white")
+    return Pattern{text == "dark" ? Kind::dark : Kind::white};
   Pattern pattern;
-  if (text == "dark")
-    return pattern;
-  if (text == "white") {
-    pattern.kind = Kind::white;
-    return pattern;
-  }
   std::string_view numbers = text;
   if (text.starts_with ("grating-"))
     pattern.kind = Kind::grating;
@@ -104,19 +100,11 @@ Pattern::parse (std::string_view text)
 std::string
 Pattern::text () const
 {
-  switch (kind) {
-  case Kind::dark:
-    return "dark";
-  case Kind::white:
-    return "white";
-  case Kind::grating:
-    return std::string ("grating-") + axis_text (axis) + ":" +
-           std::to_string (period) + "/" + std::to_string (phase);
-  case Kind::gray:
-    break;
-  }
-  return std::string ("gray-") + axis_text (axis) + ":" +
-         std::to_string (period) + "/" + std::to_string (bit) +
+  if (kind == Kind::dark || kind == Kind::white)
+    return kind == Kind::dark ? "dark" : "white";
+  const bool moves = kind == Kind::grating;
+  return std::string (moves ? "grating-" : "gray-") + axis_text (axis) + ":" +
+         std::to_string (period) + "/" + std::to_string (moves ? phase : bit) +
          (inverse ? std::string (kInverse) : "");
 }
 

@@ -95,17 +95,170 @@ public:
     part_ = Image<float> (off.width (), off.height ());
   }
 
-  Defects run ();
+  Defects run ()
+  {
+    bright_ = quantile (std::as_const (field_).pixels (), 0.9);
+    const float least =
+        std::max (float (kCovered) * bright_, 0.005f * float (largest_));
+    each_pixel (off_,
+        [&] (int x, int y) { covered_.at (x, y) = field_.at (x, y) > least; });
+    find_spread ();
+    find_bright ();
+    find_dim ();
+    each_pixel (off_, [&] (int x, int y) {
+      found_.good.at (x, y) = covered_.at (x, y) != 0 && known_.at (x, y) == 0;
+    });
+    return std::move (found_);
+  }
 
 private:
-  void find_spread ();
-  void find_bright ();
-  void find_dim ();
-  void add_dim (const Group &group);
-  DefectSpot spot_of (const Group &group) const;
+  /* The median does not see defects. */
+  void find_spread ()
+  {
+    constexpr double kSigmas = 1.4826; // of a median
+    std::vector<float> values;
+    each_pixel (light_, [&] (int x, int y) {
+      if (covered_.at (x, y) != 0)
+        values.push_back (
+            std::abs (1.0f - light_.at (x, y) / field_.at (x, y)));
+    });
+    if (!values.empty ())
+      found_.spread = kSigmas * double (median (std::move (values)));
+  }
+
+  void find_bright ()
+  {
+    Image<std::uint8_t> marked (off_.width (), off_.height ());
+    each_pixel (off_, [&] (int x, int y) {
+      const float unit = std::max (
+          {0.1f * float (largest_), 0.5f * bright_, field_.at (x, y)});
+      part_.at (x, y) = (off_.at (x, y) - dark_.at (x, y)) / unit;
+      marked.at (x, y) = part_.at (x, y) > 0.5f * float (kDiffers);
+    });
+    for (const Group &group : groups_of (marked)) {
+      const Offset peak = *std::ranges::max_element (group.pixels, {},
+          [&] (const Offset &at) { return off_.at (at.x, at.y); });
+      const double more =
+          double (off_.at (peak.x, peak.y)) - ring_median (off_, peak);
+      const double usual = ring_median (on_, peak);
+      const double brighter = double (on_.at (peak.x, peak.y)) - usual;
+      if (brighter > 0.5 * std::min (more, largest_ - usual)) {
+        for (const Offset &at : group.pixels)
+          found_.hot.push_back (at);
+        know (group, 0);
+        continue;
+      }
+      const DefectSpot spot = spot_of (group);
+      know (group, 2);
+      /* Larger ones are the border of what leaks past the mirrors. */
+      if (spot.light > kMirrorMin * mirror_ && spot.pixels < kSpot * mirror_)
+        found_.stuck_on.push_back (spot);
+    }
+  }
+
+  void find_dim ()
+  {
+    Image<std::uint8_t> marked (off_.width (), off_.height ());
+    const double differs = std::clamp (kOutlier * found_.spread, kDiffers, 0.5);
+    each_pixel (off_, [&] (int x, int y) {
+      const bool open = covered_.at (x, y) != 0 && known_.at (x, y) == 0;
+      part_.at (x, y) =
+          open ? 1.0f - light_.at (x, y) / field_.at (x, y) : 0.0f;
+      marked.at (x, y) = part_.at (x, y) > float (differs);
+    });
+    for (const Group &group : groups_of (marked))
+      add_dim (group);
+  }
+
+  void add_dim (const Group &group)
+  {
+    const Offset first = group.pixels[0];
+    know (group, group.pixels.size () == 1 ? 0 : 2);
+    if (group.pixels.size () <= 2 &&
+        double (part_.at (first.x, first.y)) > 1.0 - kDead) {
+      for (const Offset &at : group.pixels)
+        found_.dead.push_back (at);
+      return;
+    }
+    const DefectSpot spot = spot_of (group);
+    if (const Shape shape = shape_of (group); shape != Shape::other) {
+      if (shape == Shape::pixels)
+        found_.dead.insert (
+            found_.dead.end (), group.pixels.begin (), group.pixels.end ());
+      else
+        found_.stuck_off.push_back (spot);
+      return;
+    }
+    if (group.at_border && spot.light > kMirrorMax * mirror_) {
+      for (const Offset &at : group.pixels)
+        if (double (part_.at (at.x, at.y)) > 0.5)
+          covered_.at (at.x, at.y) = 0;
+      return;
+    }
+    if (spot.light > kMirrorMax * mirror_)
+      found_.dust.push_back (spot);
+    else if (spot.light > kMirrorMin * mirror_)
+      found_.stuck_off.push_back (spot);
+  }
+
+  DefectSpot spot_of (const Group &group) const
+  {
+    DefectSpot spot;
+    spot.pixels = int (group.pixels.size ());
+    for (const Offset &at : group.pixels) {
+      const double part = double (part_.at (at.x, at.y));
+      spot.centre.x += part * at.x;
+      spot.centre.y += part * at.y;
+      spot.light += part;
+    }
+    spot.centre.x /= spot.light;
+    spot.centre.y /= spot.light;
+    return spot;
+  }
+
   enum class Shape { pixels, mirrors, other };
-  Shape shape_of (const Group &group) const;
-  void know (const Group &group, int margin);
+
+  /** Lines and blocks along the axes do not come from dust: those with sharp
+   * borders are of pixels, those that the lens blurs are of mirrors. */
+  Shape shape_of (const Group &group) const
+  {
+    int left = off_.width (), top = off_.height (), right = 0, bottom = 0;
+    int dark = 0, darkest = 0;
+    double part_of_dark = 0.0;
+    for (const Offset &at : group.pixels) {
+      const double part = double (part_.at (at.x, at.y));
+      darkest += part > 1.0 - kDead;
+      if (part < 0.5)
+        continue;
+      dark++;
+      part_of_dark += part;
+      left = std::min (left, at.x);
+      right = std::max (right, at.x + 1);
+      top = std::min (top, at.y);
+      bottom = std::max (bottom, at.y + 1);
+    }
+    const int width = right - left, height = bottom - top;
+    const double mirror = std::sqrt (mirror_);
+    const double thick = std::min (width, height),
+                 length = std::max (width, height);
+    const bool line = thick <= kLine * mirror && length >= kLong * thick;
+    const bool block = thick >= kThick * mirror &&
+                       dark > kFilled * width * height &&
+                       part_of_dark > kFilled * dark;
+    /* A block at the border may be where no mirrors are. */
+    if (!line && (!block || group.at_border))
+      return Shape::other;
+    return darkest > kSharp * double (group.pixels.size ()) ? Shape::pixels
+                                                            : Shape::mirrors;
+  }
+
+  void know (const Group &group, int margin)
+  {
+    for (const Offset &at : group.pixels)
+      each_near (
+          known_, at, margin, [&] (int x, int y) { known_.at (x, y) = 1; });
+  }
+
   const Image<float> &off_, &on_;
   Image<float> light_, dark_, field_;
   float bright_ = 0.0f; // light of bright pixels
@@ -116,173 +269,6 @@ private:
   Image<std::uint8_t> known_;   // pixels of defects, and those beside them
   Defects found_;
 };
-
-void
-Search::know (const Group &group, int margin)
-{
-  for (const Offset &at : group.pixels)
-    each_near (
-        known_, at, margin, [&] (int x, int y) { known_.at (x, y) = 1; });
-}
-
-DefectSpot
-Search::spot_of (const Group &group) const
-{
-  DefectSpot spot;
-  spot.pixels = int (group.pixels.size ());
-  for (const Offset &at : group.pixels) {
-    const double part = double (part_.at (at.x, at.y));
-    spot.centre.x += part * at.x;
-    spot.centre.y += part * at.y;
-    spot.light += part;
-  }
-  spot.centre.x /= spot.light;
-  spot.centre.y /= spot.light;
-  return spot;
-}
-
-/* The median does not see defects. */
-void
-Search::find_spread ()
-{
-  constexpr double kSigmas = 1.4826; // of a median
-  std::vector<float> values;
-  each_pixel (light_, [&] (int x, int y) {
-    if (covered_.at (x, y) != 0)
-      values.push_back (std::abs (1.0f - light_.at (x, y) / field_.at (x, y)));
-  });
-  if (!values.empty ())
-    found_.spread = kSigmas * double (median (std::move (values)));
-}
-
-void
-Search::find_bright ()
-{
-  Image<std::uint8_t> marked (off_.width (), off_.height ());
-  each_pixel (off_, [&] (int x, int y) {
-    const float unit =
-        std::max ({0.1f * float (largest_), 0.5f * bright_, field_.at (x, y)});
-    part_.at (x, y) = (off_.at (x, y) - dark_.at (x, y)) / unit;
-    marked.at (x, y) = part_.at (x, y) > 0.5f * float (kDiffers);
-  });
-  for (const Group &group : groups_of (marked)) {
-    const Offset peak = *std::ranges::max_element (group.pixels, {},
-        [&] (const Offset &at) { return off_.at (at.x, at.y); });
-    const double more =
-        double (off_.at (peak.x, peak.y)) - ring_median (off_, peak);
-    const double usual = ring_median (on_, peak);
-    const double brighter = double (on_.at (peak.x, peak.y)) - usual;
-    if (brighter > 0.5 * std::min (more, largest_ - usual)) {
-      for (const Offset &at : group.pixels)
-        found_.hot.push_back (at);
-      know (group, 0);
-      continue;
-    }
-    const DefectSpot spot = spot_of (group);
-    know (group, 2);
-    /* Larger ones are the border of what leaks past the mirrors. */
-    if (spot.light > kMirrorMin * mirror_ && spot.pixels < kSpot * mirror_)
-      found_.stuck_on.push_back (spot);
-  }
-}
-
-/** Lines and blocks along the axes do not come from dust: those with sharp
- * borders are of pixels, those that the lens blurs are of mirrors. */
-Search::Shape
-Search::shape_of (const Group &group) const
-{
-  int left = off_.width (), top = off_.height (), right = 0, bottom = 0;
-  int dark = 0, darkest = 0;
-  double part_of_dark = 0.0;
-  for (const Offset &at : group.pixels) {
-    const double part = double (part_.at (at.x, at.y));
-    darkest += part > 1.0 - kDead;
-    if (part < 0.5)
-      continue;
-    dark++;
-    part_of_dark += part;
-    left = std::min (left, at.x);
-    right = std::max (right, at.x + 1);
-    top = std::min (top, at.y);
-    bottom = std::max (bottom, at.y + 1);
-  }
-  const int width = right - left, height = bottom - top;
-  const double mirror = std::sqrt (mirror_);
-  const double thick = std::min (width, height),
-               length = std::max (width, height);
-  const bool line = thick <= kLine * mirror && length >= kLong * thick;
-  const bool block = thick >= kThick * mirror &&
-                     dark > kFilled * width * height &&
-                     part_of_dark > kFilled * dark;
-  /* A block at the border may be where no mirrors are. */
-  if (!line && (!block || group.at_border))
-    return Shape::other;
-  return darkest > kSharp * double (group.pixels.size ()) ? Shape::pixels
-                                                          : Shape::mirrors;
-}
-
-void
-Search::add_dim (const Group &group)
-{
-  const Offset first = group.pixels[0];
-  know (group, group.pixels.size () == 1 ? 0 : 2);
-  if (group.pixels.size () <= 2 &&
-      double (part_.at (first.x, first.y)) > 1.0 - kDead) {
-    for (const Offset &at : group.pixels)
-      found_.dead.push_back (at);
-    return;
-  }
-  const DefectSpot spot = spot_of (group);
-  if (const Shape shape = shape_of (group); shape != Shape::other) {
-    if (shape == Shape::pixels)
-      found_.dead.insert (
-          found_.dead.end (), group.pixels.begin (), group.pixels.end ());
-    else
-      found_.stuck_off.push_back (spot);
-    return;
-  }
-  if (group.at_border && spot.light > kMirrorMax * mirror_) {
-    for (const Offset &at : group.pixels)
-      if (double (part_.at (at.x, at.y)) > 0.5)
-        covered_.at (at.x, at.y) = 0;
-    return;
-  }
-  if (spot.light > kMirrorMax * mirror_)
-    found_.dust.push_back (spot);
-  else if (spot.light > kMirrorMin * mirror_)
-    found_.stuck_off.push_back (spot);
-}
-
-void
-Search::find_dim ()
-{
-  Image<std::uint8_t> marked (off_.width (), off_.height ());
-  const double differs = std::clamp (kOutlier * found_.spread, kDiffers, 0.5);
-  each_pixel (off_, [&] (int x, int y) {
-    const bool open = covered_.at (x, y) != 0 && known_.at (x, y) == 0;
-    part_.at (x, y) = open ? 1.0f - light_.at (x, y) / field_.at (x, y) : 0.0f;
-    marked.at (x, y) = part_.at (x, y) > float (differs);
-  });
-  for (const Group &group : groups_of (marked))
-    add_dim (group);
-}
-
-Defects
-Search::run ()
-{
-  bright_ = quantile (std::as_const (field_).pixels (), 0.9);
-  const float least =
-      std::max (float (kCovered) * bright_, 0.005f * float (largest_));
-  each_pixel (off_,
-      [&] (int x, int y) { covered_.at (x, y) = field_.at (x, y) > least; });
-  find_spread ();
-  find_bright ();
-  find_dim ();
-  each_pixel (off_, [&] (int x, int y) {
-    found_.good.at (x, y) = covered_.at (x, y) != 0 && known_.at (x, y) == 0;
-  });
-  return std::move (found_);
-}
 
 } // namespace
 

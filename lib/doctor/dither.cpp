@@ -58,9 +58,65 @@ public:
   }
 
   Result<void> see_light (
-      int top, const Image<float> &dark, const Image<float> &bright);
-  Result<void> look (bool longer);
-  std::optional<Dark> fit () const;
+      int top, const Image<float> &dark, const Image<float> &bright)
+  {
+    ASSIGN_OR_RETURN (const Stack seen,
+        look_at_light (examination_, random_columns (fine_.first, top),
+            fine_.of, kBrightFrames, &dark));
+    light_ = field_ = thinned (dark, step_);
+    double mean = 0.0, pixels = 0.0;
+    each_pixel (light_, [&] (int x, int y) {
+      const Offset at = {x * step_, y * step_};
+      const double none = transfer_.light_of (double (dark.at (at.x, at.y)));
+      const auto of = [&] (const Image<float> &image) {
+        const double light =
+            transfer_.light_of (double (image.at (at.x, at.y)));
+        return transfer_.slope * (light - none);
+      };
+      light_.at (x, y) = float (of (seen.mean) / top);
+      field_.at (x, y) = float (of (bright));
+      const bool counts = good_.at (at.x, at.y) != 0;
+      mean += counts ? double (field_.at (x, y)) : 0.0;
+      pixels += counts;
+    });
+    const float scale = float (pixels / std::max (1e-3, mean));
+    each_pixel (field_, [&] (int x, int y) { field_.at (x, y) *= scale; });
+    return {};
+  }
+
+  /* The mirrors are on a while after the exposure has begun. */
+  Result<void> look (bool longer)
+  {
+    for (const double length : kLengths) {
+      const int of = std::max (1, int (fine_.of / length));
+      const int first = of * fine_.first / fine_.of + of / (4 * kShorter);
+      ASSIGN_OR_RETURN (
+          Stack stack, look_at_light (examination_, random_columns (first, 1),
+                           of, longer ? kLongFrames : kShortFrames));
+      shorter_ = means_of (stack, good_);
+      looks_.push_back ({stack.frames, thinned (stack.mean, step_),
+          thinned (stack.variance, step_), double (fine_.of) / of, longer});
+    }
+    return {};
+  }
+
+  /* Which pixels get the same light depends on the off light. */
+  std::optional<Dark> fit () const
+  {
+    std::optional<Dark> dark;
+    for (int round = 0; round < 3; round++) {
+      const double off = dark ? std::max (0.0, dark->off.value) : 0.0;
+      std::vector<DitherGroup> groups;
+      for (std::size_t look = 0; look < looks_.size (); look++)
+        add_groups (look, off, groups);
+      const auto next = fit_dither (groups, part_, transfer_.conversion_gain,
+          dark ? std::optional<double> (off) : std::nullopt);
+      if (!next)
+        break;
+      dark = next;
+    }
+    return dark;
+  }
 
   const StackMeans &shorter () const { return shorter_; }
 
@@ -71,8 +127,44 @@ private:
     double length;               // of the light
     bool longer;
   };
+
   void add_groups (
-      std::size_t look, double off, std::vector<DitherGroup> &all) const;
+      std::size_t look, double off, std::vector<DitherGroup> &all) const
+  {
+    const Look &seen = looks_[look];
+    std::vector<DitherGroup> groups (std::size_t (kMost / kWidth) + 1);
+    each_pixel (light_, [&] (int x, int y) {
+      const double light = seen.length * double (light_.at (x, y));
+      const double field = double (field_.at (x, y));
+      const double more =
+          light + (seen.longer ? 1.0 : part_) * off * (field - 1.0);
+      if (good_.at (x * step_, y * step_) == 0 || more >= kMost ||
+          more < -kWidth / 2)
+        return;
+      DitherGroup &group =
+          groups[std::size_t (std::max (0.0, more / kWidth + 0.5))];
+      const double mean = double (seen.mean.at (x, y));
+      group.pixels++;
+      group.light += light;
+      group.field += field;
+      group.mean += mean;
+      group.spread += mean * mean;
+      group.variance += double (seen.variance.at (x, y));
+    });
+    for (DitherGroup &group : groups) {
+      if (group.pixels < kFewPixels)
+        continue;
+      group.look = int (look);
+      group.longer = seen.longer;
+      group.frames = seen.frames;
+      group.field -= 1.0; // where the sum began
+      for (double *sum : {&group.light, &group.field, &group.mean,
+               &group.spread, &group.variance})
+        *sum /= group.pixels;
+      group.spread = std::max (0.0, group.spread - group.mean * group.mean);
+      all.push_back (group);
+    }
+  }
 
   Examination &examination_;
   const Examination::Lit fine_;
@@ -86,108 +178,6 @@ private:
   StackMeans shorter_;         // of the last look
   std::vector<Look> looks_;
 };
-
-Result<void>
-DitherRun::see_light (
-    int top, const Image<float> &dark, const Image<float> &bright)
-{
-  ASSIGN_OR_RETURN (const Stack seen,
-      look_at_light (examination_, random_columns (fine_.first, top), fine_.of,
-          kBrightFrames, &dark));
-  light_ = field_ = thinned (dark, step_);
-  double mean = 0.0, pixels = 0.0;
-  each_pixel (light_, [&] (int x, int y) {
-    const Offset at = {x * step_, y * step_};
-    const double none = transfer_.light_of (double (dark.at (at.x, at.y)));
-    const auto of = [&] (const Image<float> &image) {
-      const double light = transfer_.light_of (double (image.at (at.x, at.y)));
-      return transfer_.slope * (light - none);
-    };
-    light_.at (x, y) = float (of (seen.mean) / top);
-    field_.at (x, y) = float (of (bright));
-    const bool counts = good_.at (at.x, at.y) != 0;
-    mean += counts ? double (field_.at (x, y)) : 0.0;
-    pixels += counts;
-  });
-  const float scale = float (pixels / std::max (1e-3, mean));
-  each_pixel (field_, [&] (int x, int y) { field_.at (x, y) *= scale; });
-  return {};
-}
-
-/* The mirrors are on a while after the exposure has begun. */
-Result<void>
-DitherRun::look (bool longer)
-{
-  for (const double length : kLengths) {
-    const int of = std::max (1, int (fine_.of / length));
-    const int first = of * fine_.first / fine_.of + of / (4 * kShorter);
-    ASSIGN_OR_RETURN (
-        Stack stack, look_at_light (examination_, random_columns (first, 1), of,
-                         longer ? kLongFrames : kShortFrames));
-    shorter_ = means_of (stack, good_);
-    looks_.push_back ({stack.frames, thinned (stack.mean, step_),
-        thinned (stack.variance, step_), double (fine_.of) / of, longer});
-  }
-  return {};
-}
-
-void
-DitherRun::add_groups (
-    std::size_t look, double off, std::vector<DitherGroup> &all) const
-{
-  const Look &seen = looks_[look];
-  std::vector<DitherGroup> groups (std::size_t (kMost / kWidth) + 1);
-  each_pixel (light_, [&] (int x, int y) {
-    const double light = seen.length * double (light_.at (x, y));
-    const double field = double (field_.at (x, y));
-    const double more =
-        light + (seen.longer ? 1.0 : part_) * off * (field - 1.0);
-    if (good_.at (x * step_, y * step_) == 0 || more >= kMost ||
-        more < -kWidth / 2)
-      return;
-    DitherGroup &group =
-        groups[std::size_t (std::max (0.0, more / kWidth + 0.5))];
-    const double mean = double (seen.mean.at (x, y));
-    group.pixels++;
-    group.light += light;
-    group.field += field;
-    group.mean += mean;
-    group.spread += mean * mean;
-    group.variance += double (seen.variance.at (x, y));
-  });
-  for (DitherGroup &group : groups) {
-    if (group.pixels < kFewPixels)
-      continue;
-    group.look = int (look);
-    group.longer = seen.longer;
-    group.frames = seen.frames;
-    group.field -= 1.0; // where the sum began
-    for (double *sum : {&group.light, &group.field, &group.mean, &group.spread,
-             &group.variance})
-      *sum /= group.pixels;
-    group.spread = std::max (0.0, group.spread - group.mean * group.mean);
-    all.push_back (group);
-  }
-}
-
-/* Which pixels get the same light depends on the off light. */
-std::optional<Dark>
-DitherRun::fit () const
-{
-  std::optional<Dark> dark;
-  for (int round = 0; round < 3; round++) {
-    const double off = dark ? std::max (0.0, dark->off.value) : 0.0;
-    std::vector<DitherGroup> groups;
-    for (std::size_t look = 0; look < looks_.size (); look++)
-      add_groups (look, off, groups);
-    const auto next = fit_dither (groups, part_, transfer_.conversion_gain,
-        dark ? std::optional<double> (off) : std::nullopt);
-    if (!next)
-      break;
-    dark = next;
-  }
-  return dark;
-}
 
 /** Looks again until more frames would not help. */
 Result<void>

@@ -57,93 +57,84 @@ public:
   {
     return double (2 * groups_.size () + 1) + looks_ - double (count ());
   }
-  Numbers start (std::optional<double> off) const;
+
+  Numbers start (std::optional<double> off) const
+  {
+    /* Means over many groups are hardly rounded. */
+    double dark[2] = {}, pixels[2] = {};
+    for (const DitherGroup &group : groups_) {
+      dark[group.longer] += (group.mean - group.light) * group.pixels;
+      pixels[group.longer] += group.pixels;
+    }
+    const double shorter = dark[0] / std::max (1.0, pixels[0]);
+    const double longer = dark[1] / std::max (1.0, pixels[1]);
+    Numbers n = Numbers::Ones (count ());
+    n[kOff] = off.value_or (std::max (0.0, (longer - shorter) / (1.0 - part_)));
+    n[kBlack] = shorter - part_ * n[kOff];
+    n[kVariance] = 0.01;
+    n[kSpread] = 0.02;
+    n[kPerGain] = per_gain_;
+    return n;
+  }
+
   /** Sets the errors of mean and variance from what @p n expects. */
-  void weigh (const Numbers &n);
+  void weigh (const Numbers &n)
+  {
+    errors_.clear ();
+    for (const DitherGroup &group : groups_) {
+      const RoundedMoments e = expected (group, n);
+      const double values = group.pixels * group.frames;
+      const double square = e.variance * e.variance;
+      const double one = 1.0 / values; // a single value that differs
+      const double of_variance =
+          std::max (0.0, e.fourth - square) + 2.0 * square / (group.frames - 1);
+      errors_.emplace_back (std::sqrt (std::max (group.spread / group.pixels,
+                                           e.variance / values) +
+                                       one * one),
+          std::sqrt (of_variance / values + one * one));
+    }
+  }
+
   /** By their errors: means, variances, the gain, and light of looks. */
-  Eigen::VectorXd residuals (const Numbers &n) const;
+  Eigen::VectorXd residuals (const Numbers &n) const
+  {
+    Eigen::VectorXd rest (Eigen::Index (2 * groups_.size () + 1) + looks_);
+    Eigen::Index i = 0;
+    for (std::size_t g = 0; g < groups_.size (); g++) {
+      const RoundedMoments e = expected (groups_[g], n);
+      rest[i++] = (groups_[g].mean - e.mean) / errors_[g].first;
+      rest[i++] = (groups_[g].variance - e.variance) / errors_[g].second;
+    }
+    rest[i++] = (per_gain_ - n[kPerGain]) / per_gain_sigma_;
+    for (int look = 0; look < looks_; look++)
+      rest[i++] = (1.0 - n[kLooks + look]) / kLightError;
+    return rest;
+  }
 
 private:
-  RoundedMoments expected (const DitherGroup &group, const Numbers &n) const;
+  RoundedMoments expected (const DitherGroup &group, const Numbers &n) const
+  {
+    const double light = n[kLooks + group.look] * group.light +
+                         (group.longer ? 1.0 : part_) * group.field * n[kOff];
+    const double shot = std::max (0.0, light) * n[kPerGain];
+    const double sigma = std::sqrt (std::max (1e-6, n[kVariance] + shot));
+    const double spread = std::clamp (n[kSpread], 0.0, kMostSpread);
+    RoundedMoments sum;
+    for (std::size_t i = 0; i < kOffsets.size (); i++) {
+      const RoundedMoments one = rounded_moments (
+          n[kBlack] + light + kOffsets[i] * spread, sigma, shot * n[kPerGain]);
+      sum.mean += kWeights[i] * one.mean;
+      sum.variance += kWeights[i] * one.variance;
+      sum.fourth += kWeights[i] * one.fourth;
+    }
+    return sum;
+  }
 
   const std::vector<DitherGroup> &groups_;
   double part_, per_gain_, per_gain_sigma_;
   int looks_ = 0;
   std::vector<std::pair<double, double>> errors_;
 };
-
-Numbers
-Model::start (std::optional<double> off) const
-{
-  /* Means over many groups are hardly rounded. */
-  double dark[2] = {}, pixels[2] = {};
-  for (const DitherGroup &group : groups_) {
-    dark[group.longer] += (group.mean - group.light) * group.pixels;
-    pixels[group.longer] += group.pixels;
-  }
-  const double shorter = dark[0] / std::max (1.0, pixels[0]);
-  const double longer = dark[1] / std::max (1.0, pixels[1]);
-  Numbers n = Numbers::Ones (count ());
-  n[kOff] = off.value_or (std::max (0.0, (longer - shorter) / (1.0 - part_)));
-  n[kBlack] = shorter - part_ * n[kOff];
-  n[kVariance] = 0.01;
-  n[kSpread] = 0.02;
-  n[kPerGain] = per_gain_;
-  return n;
-}
-
-RoundedMoments
-Model::expected (const DitherGroup &group, const Numbers &n) const
-{
-  const double light = n[kLooks + group.look] * group.light +
-                       (group.longer ? 1.0 : part_) * group.field * n[kOff];
-  const double shot = std::max (0.0, light) * n[kPerGain];
-  const double sigma = std::sqrt (std::max (1e-6, n[kVariance] + shot));
-  const double spread = std::clamp (n[kSpread], 0.0, kMostSpread);
-  RoundedMoments sum;
-  for (std::size_t i = 0; i < kOffsets.size (); i++) {
-    const RoundedMoments one = rounded_moments (
-        n[kBlack] + light + kOffsets[i] * spread, sigma, shot * n[kPerGain]);
-    sum.mean += kWeights[i] * one.mean;
-    sum.variance += kWeights[i] * one.variance;
-    sum.fourth += kWeights[i] * one.fourth;
-  }
-  return sum;
-}
-
-void
-Model::weigh (const Numbers &n)
-{
-  errors_.clear ();
-  for (const DitherGroup &group : groups_) {
-    const RoundedMoments e = expected (group, n);
-    const double values = group.pixels * group.frames;
-    const double square = e.variance * e.variance;
-    const double one = 1.0 / values; // a single value that differs
-    const double of_variance =
-        std::max (0.0, e.fourth - square) + 2.0 * square / (group.frames - 1);
-    errors_.emplace_back (
-        std::sqrt (std::max (group.spread / group.pixels, e.variance / values) +
-                   one * one),
-        std::sqrt (of_variance / values + one * one));
-  }
-}
-
-Eigen::VectorXd
-Model::residuals (const Numbers &n) const
-{
-  Eigen::VectorXd rest (Eigen::Index (2 * groups_.size () + 1) + looks_);
-  Eigen::Index i = 0;
-  for (std::size_t g = 0; g < groups_.size (); g++) {
-    const RoundedMoments e = expected (groups_[g], n);
-    rest[i++] = (groups_[g].mean - e.mean) / errors_[g].first;
-    rest[i++] = (groups_[g].variance - e.variance) / errors_[g].second;
-  }
-  rest[i++] = (per_gain_ - n[kPerGain]) / per_gain_sigma_;
-  for (int look = 0; look < looks_; look++)
-    rest[i++] = (1.0 - n[kLooks + look]) / kLightError;
-  return rest;
-}
 
 } // namespace
 

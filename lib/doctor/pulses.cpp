@@ -114,13 +114,75 @@ public:
   {
   }
 
-  void add (const Runs &runs);
+  void add (const Runs &runs)
+  {
+    const LightModel &model = light_.model;
+    const double offset = model.offsets.size () > 1 ? model.offsets[1] : 0.0;
+    double mean = 0.0;
+    for (const LightSample &sample : runs.samples)
+      mean += (sample.light - offset) / double (runs.samples.size ());
+    for (const LightSample &sample : runs.samples)
+      if (mean > 0.0)
+        parts_.push_back ({added_, sample, (sample.light - offset) / mean,
+            sample.doubt / mean, sample.noise / mean});
+    added_++;
+  }
+
   /** Squares that are left of those of add () number @p first to @p last, the
    * mean, without what rounding and noise explain; the sigma is that of the
    * noise. None if there are too few. */
-  std::optional<Measured> rest (int first, int last) const;
-  /** Adds weak flicker that the check of the trigger has not seen. */
-  void find_flicker ();
+  std::optional<Measured> rest (int first, int last) const
+  {
+    const Eigen::MatrixXd rows = this->rows ();
+    const double looks = double (parts_.size ()) / kFrames;
+    const double free = looks - double (rows.cols ());
+    if (free < 3.0)
+      return std::nullopt;
+    const auto [rest, flicker] = solve (rows);
+    /* Frames of a look have their own noise, of which the fit takes less away
+     * than of what they share. */
+    const double unshared =
+        (1.0 - double (rows.cols ()) / double (parts_.size ())) * looks / free;
+    double squares = 0.0, noises = 0.0, count = 0.0;
+    for (std::size_t i = 0; i < parts_.size (); i++) {
+      const auto &[runs, sample, value, doubt, noise] = parts_[i];
+      if (runs < first || runs > last)
+        continue;
+      const double left = rest[Eigen::Index (i)];
+      squares += left * left * looks / free - doubt * doubt -
+                 std::pow (kUnlike * flicker[Eigen::Index (i)], 2);
+      noises += unshared * noise * noise;
+      count++;
+    }
+    count = std::max (1.0, count);
+    return Measured{std::max (0.0, (squares - noises) / count),
+        noises / count * std::sqrt (2.0 / count)};
+  }
+
+  /** Adds weak flicker that the check of the trigger has not seen; a line that
+   * is found by chance leaves much of the light of pulses. */
+  void find_flicker ()
+  {
+    const auto before = rest (0, added_ - 1);
+    if (!before)
+      return;
+    LineSearch search;
+    search.others = rows ();
+    search.residual = solve (search.others).rest;
+    for (std::size_t i = 0; i < parts_.size (); i++) {
+      const LightSample &sample = parts_[i].sample;
+      const double time = sample.time - light_.epoch;
+      search.lit.push_back ({int (i), 1.0 / (sample.until - sample.from),
+          time + sample.from, time + sample.until});
+    }
+    const LightLine line = search.strongest (kSlowest, kFastest);
+    if (line.depth () > kWeak)
+      return;
+    frequencies_.push_back (line.frequency);
+    const auto after = rest (0, added_ - 1);
+    if (!after || after->value > kLeft * before->value)
+      frequencies_.pop_back ();
+  }
 
 private:
   struct Part {
@@ -132,139 +194,66 @@ private:
   struct Fitted {
     Eigen::VectorXd rest, flicker;
   };
-  Eigen::MatrixXd rows () const;
-  Fitted solve (const Eigen::MatrixXd &rows) const;
+
+  /* A factor for each length, since controllers count in microseconds; cosine
+   * and sine of each frequency, as the mean over a run. */
+  Eigen::MatrixXd rows () const
+  {
+    using std::numbers::pi;
+    const auto columns = Eigen::Index (frequencies_.size ());
+    /* Mirrors that are off pass light in all of the exposure. */
+    const LightModel &model = light_.model;
+    const double length = model.lengths.back ();
+    const double leaks = model.leak * length;
+    Eigen::MatrixXd rows = Eigen::MatrixXd::Zero (
+        Eigen::Index (parts_.size ()), added_ + 2 * columns);
+    for (std::size_t i = 0; i < parts_.size (); i++) {
+      const auto &[runs, sample, light, doubt, noise] = parts_[i];
+      const auto row = Eigen::Index (i);
+      rows (row, runs) = 1.0;
+      for (Eigen::Index k = 0; k < columns; k++) {
+        const double turns = 2.0 * pi * frequencies_[std::size_t (k)];
+        const auto add = [&] (double part, double from, double until) {
+          const double half = 0.5 * turns * (until - from);
+          const double middle =
+              turns * (sample.time - light_.epoch + 0.5 * (from + until));
+          rows (row, added_ + 2 * k) +=
+              part * std::cos (middle) * std::sin (half) / half;
+          rows (row, added_ + 2 * k + 1) +=
+              part * std::sin (middle) * std::sin (half) / half;
+        };
+        add (1.0, sample.from, sample.until);
+        add (leaks / (sample.until - sample.from), model.start,
+            model.start + length);
+      }
+    }
+    return rows;
+  }
+
+  Fitted solve (const Eigen::MatrixXd &rows) const
+  {
+    Fitted fitted;
+    Eigen::VectorXd light (rows.rows ());
+    for (std::size_t i = 0; i < parts_.size (); i++)
+      light[Eigen::Index (i)] = parts_[i].light;
+    /* Few runs under strong flicker have another mean than all light has. */
+    for (int round = 0; round < kRounds; round++) {
+      const Eigen::VectorXd found =
+          solve_normal (normal_of (rows), rows.transpose () * light);
+      fitted.rest = light - rows * found;
+      fitted.flicker = rows.rightCols (rows.cols () - added_) *
+                       found.tail (rows.cols () - added_);
+      for (std::size_t i = 0; i < parts_.size (); i++)
+        light[Eigen::Index (i)] /= found[parts_[i].runs];
+    }
+    return fitted;
+  }
 
   const LightFit &light_;
   std::vector<double> frequencies_;
   std::vector<Part> parts_;
   int added_ = 0;
 };
-
-void
-RunFit::add (const Runs &runs)
-{
-  const LightModel &model = light_.model;
-  const double offset = model.offsets.size () > 1 ? model.offsets[1] : 0.0;
-  double mean = 0.0;
-  for (const LightSample &sample : runs.samples)
-    mean += (sample.light - offset) / double (runs.samples.size ());
-  for (const LightSample &sample : runs.samples)
-    if (mean > 0.0)
-      parts_.push_back ({added_, sample, (sample.light - offset) / mean,
-          sample.doubt / mean, sample.noise / mean});
-  added_++;
-}
-
-/* A factor for each length, since controllers count in microseconds; cosine and
- * sine of each frequency, as the mean over a run. */
-Eigen::MatrixXd
-RunFit::rows () const
-{
-  using std::numbers::pi;
-  const auto columns = Eigen::Index (frequencies_.size ());
-  /* Mirrors that are off pass light in all of the exposure. */
-  const LightModel &model = light_.model;
-  const double length = model.lengths.back ();
-  const double leaks = model.leak * length;
-  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero (
-      Eigen::Index (parts_.size ()), added_ + 2 * columns);
-  for (std::size_t i = 0; i < parts_.size (); i++) {
-    const auto &[runs, sample, light, doubt, noise] = parts_[i];
-    const auto row = Eigen::Index (i);
-    rows (row, runs) = 1.0;
-    for (Eigen::Index k = 0; k < columns; k++) {
-      const double turns = 2.0 * pi * frequencies_[std::size_t (k)];
-      const auto add = [&] (double part, double from, double until) {
-        const double half = 0.5 * turns * (until - from);
-        const double middle =
-            turns * (sample.time - light_.epoch + 0.5 * (from + until));
-        rows (row, added_ + 2 * k) +=
-            part * std::cos (middle) * std::sin (half) / half;
-        rows (row, added_ + 2 * k + 1) +=
-            part * std::sin (middle) * std::sin (half) / half;
-      };
-      add (1.0, sample.from, sample.until);
-      add (leaks / (sample.until - sample.from), model.start,
-          model.start + length);
-    }
-  }
-  return rows;
-}
-
-RunFit::Fitted
-RunFit::solve (const Eigen::MatrixXd &rows) const
-{
-  Fitted fitted;
-  Eigen::VectorXd light (rows.rows ());
-  for (std::size_t i = 0; i < parts_.size (); i++)
-    light[Eigen::Index (i)] = parts_[i].light;
-  /* Few runs under strong flicker have another mean than all light has. */
-  for (int round = 0; round < kRounds; round++) {
-    const Eigen::VectorXd found =
-        solve_normal (normal_of (rows), rows.transpose () * light);
-    fitted.rest = light - rows * found;
-    fitted.flicker = rows.rightCols (rows.cols () - added_) *
-                     found.tail (rows.cols () - added_);
-    for (std::size_t i = 0; i < parts_.size (); i++)
-      light[Eigen::Index (i)] /= found[parts_[i].runs];
-  }
-  return fitted;
-}
-
-std::optional<Measured>
-RunFit::rest (int first, int last) const
-{
-  const Eigen::MatrixXd rows = this->rows ();
-  const double looks = double (parts_.size ()) / kFrames;
-  const double free = looks - double (rows.cols ());
-  if (free < 3.0)
-    return std::nullopt;
-  const auto [rest, flicker] = solve (rows);
-  /* Frames of a look have their own noise, of which the fit takes less away
-   * than of what they share. */
-  const double unshared =
-      (1.0 - double (rows.cols ()) / double (parts_.size ())) * looks / free;
-  double squares = 0.0, noises = 0.0, count = 0.0;
-  for (std::size_t i = 0; i < parts_.size (); i++) {
-    const auto &[runs, sample, value, doubt, noise] = parts_[i];
-    if (runs < first || runs > last)
-      continue;
-    const double left = rest[Eigen::Index (i)];
-    squares += left * left * looks / free - doubt * doubt -
-               std::pow (kUnlike * flicker[Eigen::Index (i)], 2);
-    noises += unshared * noise * noise;
-    count++;
-  }
-  count = std::max (1.0, count);
-  return Measured{std::max (0.0, (squares - noises) / count),
-      noises / count * std::sqrt (2.0 / count)};
-}
-
-/* A line that is found by chance leaves much of the light of pulses. */
-void
-RunFit::find_flicker ()
-{
-  const auto before = rest (0, added_ - 1);
-  if (!before)
-    return;
-  LineSearch search;
-  search.others = rows ();
-  search.residual = solve (search.others).rest;
-  for (std::size_t i = 0; i < parts_.size (); i++) {
-    const LightSample &sample = parts_[i].sample;
-    const double time = sample.time - light_.epoch;
-    search.lit.push_back ({int (i), 1.0 / (sample.until - sample.from),
-        time + sample.from, time + sample.until});
-  }
-  const LightLine line = search.strongest (kSlowest, kFastest);
-  if (line.depth () > kWeak)
-    return;
-  frequencies_.push_back (line.frequency);
-  const auto after = rest (0, added_ - 1);
-  if (!after || after->value > kLeft * before->value)
-    frequencies_.pop_back ();
-}
 
 /** Adds runs of @p slots slots at some places that lie in the exposure. */
 Result<void>

@@ -129,16 +129,180 @@ public:
   }
 
   /** Looks at the target without a code. */
-  Result<void> see_target ();
-  void add (ImageView<const std::uint16_t> frame);
-  void diagnose (Finding &finding) const;
+  Result<void> see_target ()
+  {
+    constexpr int kFrames = 8;
+    const auto &[first, slots, of] = examination_.inside;
+    ASSIGN_OR_RETURN (
+        Stack dark, look_at_light (examination_, no_light (), of, kFrames));
+    ASSIGN_OR_RETURN (
+        Stack white, look_at_light (examination_,
+                         lit (first, std::max (1, slots / 2)), of, kFrames));
+    dark_ = std::move (dark.mean);
+    white_ = std::move (white.mean);
+    return {};
+  }
+
+  void add (ImageView<const std::uint16_t> frame)
+  {
+    const std::size_t part = std::size_t (added_++) % kParts;
+    frames_[part]++;
+    each_pixel (frame, [&] (int x, int y) {
+      sums_[part].at (x, y) += float (frame.at (x, y));
+    });
+  }
+
+  void diagnose (Finding &finding) const
+  {
+    if (const auto light = solve ())
+      return judge (*light, finding);
+    else
+      finding.notes.push_back ({"slots",
+          "Slots were not compared: " + light.error ().message + "."});
+    finding.add ("largest difference of a slot", kNotMeasured);
+  }
 
 private:
-  Result<Eigen::MatrixXd> solve () const;
-  bool find_shares (Position pixel, Eigen::VectorXd &shares) const;
-  std::vector<double> exposed_parts () const;
-  double rounding_of (double part) const;
-  void judge (const Eigen::MatrixXd &light, Finding &finding) const;
+  /** Light of the slots, a row each, of the parts of the recording. */
+  Result<Eigen::MatrixXd> solve () const
+  {
+    constexpr int kPixels = 30'000; // are enough
+    constexpr double kLit = 0.02, kFull = 0.98;
+    if (added_ < int (kParts))
+      return Error{"there are too few frames"};
+    if (!examination_.profile.mapping || !examination_.profile.psf_sigma)
+      return Error{
+          "the mapping is not known; run the check of the optics, too"};
+    const int largest = parts_.largest ();
+    const int all = dark_.width () * dark_.height ();
+    const int step = std::max (1, all / kPixels) | 1; // no period of a tile
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero (count_, count_);
+    Eigen::MatrixXd right = Eigen::MatrixXd::Zero (count_, kParts);
+    Eigen::VectorXd shares, seen (kParts);
+    for (int i = 0; i < all; i += step) {
+      const int x = i % dark_.width (), y = i / dark_.width ();
+      const double dark = double (dark_.at (x, y));
+      const double light = double (white_.at (x, y)) - dark;
+      if (light < kLit * largest || light + dark > kFull * largest ||
+          !find_shares ({double (x), double (y)}, shares))
+        continue;
+      for (std::size_t part = 0; part < kParts; part++)
+        seen[Eigen::Index (part)] =
+            (double (sums_[part].at (x, y)) / frames_[part] - dark) / light;
+      normal += shares * shares.transpose ();
+      right += shares * seen.transpose ();
+    }
+    const Eigen::MatrixXd light = inverse_of (normal) * right;
+    if (!light.allFinite () || !(light.sum () > 0.0))
+      return Error{"the pixels do not tell them apart"};
+    return light;
+  }
+
+  /** Which part of a pixel's light comes from mirrors that are on in each slot;
+   * false beyond the mirrors of the code. */
+  bool find_shares (Position pixel, Eigen::VectorXd &shares) const
+  {
+    const Mapping &mapping = *examination_.profile.mapping;
+    const Position at = mapping.mirror_at (pixel.x, pixel.y);
+    const double side = 1.0 / mapping.pose ().magnification;
+    const double sigma = side * examination_.profile.psf_sigma->value;
+    const double reach = 0.5 * side + 4.0 * sigma + 0.5;
+    const Extent mirrors = mapping.mirrors ();
+    const int bottom =
+        pilot_top (schedule_, MirrorLayout::address, mirrors.height);
+    if (!(at.x >= reach && at.y >= reach && at.x < mirrors.width - 1 - reach &&
+            at.y < bottom - 1 - reach))
+      return false;
+    shares.setZero (count_);
+    for (int y = int (at.y - reach); y <= int (at.y + reach) + 1; y++)
+      for (int x = int (at.x - reach); x <= int (at.x + reach) + 1; x++) {
+        const double share = mirror_share (at.x - x, side, sigma) *
+                             mirror_share (at.y - y, side, sigma);
+        for (Eigen::Index slot = 0; slot < count_; slot++)
+          shares[slot] += schedule_.on (x, y, int (slot)) ? share : 0.0;
+      }
+    return true;
+  }
+
+  /** The part of the time of each slot in which the camera exposes. */
+  std::vector<double> exposed_parts () const
+  {
+    std::vector<double> exposed (std::size_t (count_), 1.0);
+    const BenchProfile &profile = examination_.profile;
+    const auto plan =
+        SlotPlan::fit (schedule_.timing (), schedule_.slots (), parts_.rate);
+    if (!plan || !profile.trigger_delay || !profile.exposure)
+      return exposed;
+    for (std::size_t slot = 0; slot < exposed.size (); slot++) {
+      double open = 0.0;
+      for (const int cycle : {-1, 0, 1}) {
+        const double begin = double (plan->start (int (slot))) +
+                             cycle * double (plan->frame_period ());
+        const double from = std::max (begin, profile.trigger_delay->value);
+        const double until = std::min (begin + double (plan->active ()),
+            profile.trigger_delay->value + profile.exposure->value);
+        open += std::max (0.0, until - from);
+      }
+      exposed[slot] = std::min (1.0, open / double (plan->active ()));
+    }
+    return exposed;
+  }
+
+  /** Error of the light of a slot, and of those with which it is compared, as a
+   * part of it: pixels with little noise are all rounded alike. @p part: its
+   * light, as a part of that without a code. */
+  double rounding_of (double part) const
+  {
+    constexpr int kTerms = 20; // of the Fourier series of the error
+    const double light =
+        part * (mean_of (white_.view ()) - mean_of (dark_.view ())); // DN
+    const auto &gain = examination_.profile.conversion_gain;
+    const double noise = value_or (examination_.profile.read_noise, 0.0);
+    const double variance =
+        gain ? light / gain->value + std::pow (noise / gain->value, 2) : 0.0;
+    double squares = 0.0;
+    for (int k = 1; k <= kTerms; k++) {
+      const double turn = std::numbers::pi * k;
+      squares += std::exp (-4.0 * turn * turn * variance) / (2.0 * turn * turn);
+    }
+    return std::sqrt (2.0 * squares) / light;
+  }
+
+  void judge (const Eigen::MatrixXd &light, Finding &finding) const
+  {
+    const std::vector<double> exposed = exposed_parts ();
+    double sum = 0.0;
+    for (const double part : exposed)
+      sum += part;
+    const double unit = light.sum () / kParts / sum; // of a whole slot
+    const double error = std::hypot (kSlotError, rounding_of (unit));
+    Measured worst; // of the differences
+    std::size_t differs = 0, cut = 0;
+    Plot plot{"Light of the slots", "slot", "part of a whole slot"};
+    for (std::size_t slot = 0; slot < exposed.size (); slot++) {
+      const auto row = light.row (Eigen::Index (slot));
+      const Measured seen = spread_of ({row.begin (), row.end ()});
+      plot.points.push_back ({double (slot), seen.value / unit});
+      plot.model.push_back ({double (slot), exposed[slot]});
+      const Measured off = {seen.value / unit - exposed[slot],
+          std::hypot (error, seen.sigma / unit / std::sqrt (kParts))};
+      if (std::abs (off.value) > std::abs (worst.value)) {
+        worst = off;
+        differs = slot;
+      }
+      if (exposed[slot] < exposed[cut])
+        cut = slot;
+    }
+    finding.plots.push_back (std::move (plot));
+    finding.measure ("largest difference of a slot", worst,
+        "slot " + std::to_string (differs) + " of a still target is " +
+            fixed (100 * std::abs (worst.value), 1) + " % " +
+            (worst.value < 0 ? "darker" : "brighter") + " than it should be");
+    const double lost = 100.0 * (1.0 - exposed[cut]);
+    finding.measure ("light that a slot loses", {lost, 0.0},
+        "the exposure is over, or has not begun, in " + fixed (lost, 0) +
+            " % of slot " + std::to_string (cut));
+  }
 
   Examination &examination_;
   const RigParts &parts_;
@@ -149,186 +313,6 @@ private:
   std::array<int, kParts> frames_ = {};
   int added_ = 0;
 };
-
-Result<void>
-Slots::see_target ()
-{
-  constexpr int kFrames = 8;
-  const auto &[first, slots, of] = examination_.inside;
-  ASSIGN_OR_RETURN (
-      Stack dark, look_at_light (examination_, no_light (), of, kFrames));
-  ASSIGN_OR_RETURN (
-      Stack white, look_at_light (examination_,
-                       lit (first, std::max (1, slots / 2)), of, kFrames));
-  dark_ = std::move (dark.mean);
-  white_ = std::move (white.mean);
-  return {};
-}
-
-void
-Slots::add (ImageView<const std::uint16_t> frame)
-{
-  const std::size_t part = std::size_t (added_++) % kParts;
-  frames_[part]++;
-  each_pixel (frame,
-      [&] (int x, int y) { sums_[part].at (x, y) += float (frame.at (x, y)); });
-}
-
-/** Which part of a pixel's light comes from mirrors that are on in each slot;
- * false beyond the mirrors of the code. */
-bool
-Slots::find_shares (Position pixel, Eigen::VectorXd &shares) const
-{
-  const Mapping &mapping = *examination_.profile.mapping;
-  const Position at = mapping.mirror_at (pixel.x, pixel.y);
-  const double side = 1.0 / mapping.pose ().magnification;
-  const double sigma = side * examination_.profile.psf_sigma->value;
-  const double reach = 0.5 * side + 4.0 * sigma + 0.5;
-  const Extent mirrors = mapping.mirrors ();
-  const int bottom =
-      pilot_top (schedule_, MirrorLayout::address, mirrors.height);
-  if (!(at.x >= reach && at.y >= reach && at.x < mirrors.width - 1 - reach &&
-          at.y < bottom - 1 - reach))
-    return false;
-  shares.setZero (count_);
-  for (int y = int (at.y - reach); y <= int (at.y + reach) + 1; y++)
-    for (int x = int (at.x - reach); x <= int (at.x + reach) + 1; x++) {
-      const double share = mirror_share (at.x - x, side, sigma) *
-                           mirror_share (at.y - y, side, sigma);
-      for (Eigen::Index slot = 0; slot < count_; slot++)
-        shares[slot] += schedule_.on (x, y, int (slot)) ? share : 0.0;
-    }
-  return true;
-}
-
-/** Light of the slots, a row each, of the parts of the recording. */
-Result<Eigen::MatrixXd>
-Slots::solve () const
-{
-  constexpr int kPixels = 30'000; // are enough
-  constexpr double kLit = 0.02, kFull = 0.98;
-  if (added_ < int (kParts))
-    return Error{"there are too few frames"};
-  if (!examination_.profile.mapping || !examination_.profile.psf_sigma)
-    return Error{"the mapping is not known; run the check of the optics, too"};
-  const int largest = parts_.largest ();
-  const int all = dark_.width () * dark_.height ();
-  const int step = std::max (1, all / kPixels) | 1; // no period of a tile
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero (count_, count_);
-  Eigen::MatrixXd right = Eigen::MatrixXd::Zero (count_, kParts);
-  Eigen::VectorXd shares, seen (kParts);
-  for (int i = 0; i < all; i += step) {
-    const int x = i % dark_.width (), y = i / dark_.width ();
-    const double dark = double (dark_.at (x, y));
-    const double light = double (white_.at (x, y)) - dark;
-    if (light < kLit * largest || light + dark > kFull * largest ||
-        !find_shares ({double (x), double (y)}, shares))
-      continue;
-    for (std::size_t part = 0; part < kParts; part++)
-      seen[Eigen::Index (part)] =
-          (double (sums_[part].at (x, y)) / frames_[part] - dark) / light;
-    normal += shares * shares.transpose ();
-    right += shares * seen.transpose ();
-  }
-  const Eigen::MatrixXd light = inverse_of (normal) * right;
-  if (!light.allFinite () || !(light.sum () > 0.0))
-    return Error{"the pixels do not tell them apart"};
-  return light;
-}
-
-/** The part of the time of each slot in which the camera exposes. */
-std::vector<double>
-Slots::exposed_parts () const
-{
-  std::vector<double> exposed (std::size_t (count_), 1.0);
-  const BenchProfile &profile = examination_.profile;
-  const auto plan =
-      SlotPlan::fit (schedule_.timing (), schedule_.slots (), parts_.rate);
-  if (!plan || !profile.trigger_delay || !profile.exposure)
-    return exposed;
-  for (std::size_t slot = 0; slot < exposed.size (); slot++) {
-    double open = 0.0;
-    for (const int cycle : {-1, 0, 1}) {
-      const double begin = double (plan->start (int (slot))) +
-                           cycle * double (plan->frame_period ());
-      const double from = std::max (begin, profile.trigger_delay->value);
-      const double until = std::min (begin + double (plan->active ()),
-          profile.trigger_delay->value + profile.exposure->value);
-      open += std::max (0.0, until - from);
-    }
-    exposed[slot] = std::min (1.0, open / double (plan->active ()));
-  }
-  return exposed;
-}
-
-/** Error of the light of a slot, and of those with which it is compared, as a
- * part of it: pixels with little noise are all rounded alike. @p part: its
- * light, as a part of that without a code. */
-double
-Slots::rounding_of (double part) const
-{
-  constexpr int kTerms = 20; // of the Fourier series of the error
-  const double light =
-      part * (mean_of (white_.view ()) - mean_of (dark_.view ())); // DN
-  const auto &gain = examination_.profile.conversion_gain;
-  const double noise = value_or (examination_.profile.read_noise, 0.0);
-  const double variance =
-      gain ? light / gain->value + std::pow (noise / gain->value, 2) : 0.0;
-  double squares = 0.0;
-  for (int k = 1; k <= kTerms; k++) {
-    const double turn = std::numbers::pi * k;
-    squares += std::exp (-4.0 * turn * turn * variance) / (2.0 * turn * turn);
-  }
-  return std::sqrt (2.0 * squares) / light;
-}
-
-void
-Slots::judge (const Eigen::MatrixXd &light, Finding &finding) const
-{
-  const std::vector<double> exposed = exposed_parts ();
-  double sum = 0.0;
-  for (const double part : exposed)
-    sum += part;
-  const double unit = light.sum () / kParts / sum; // of a whole slot
-  const double error = std::hypot (kSlotError, rounding_of (unit));
-  Measured worst; // of the differences
-  std::size_t differs = 0, cut = 0;
-  Plot plot{"Light of the slots", "slot", "part of a whole slot"};
-  for (std::size_t slot = 0; slot < exposed.size (); slot++) {
-    const auto row = light.row (Eigen::Index (slot));
-    const Measured seen = spread_of ({row.begin (), row.end ()});
-    plot.points.push_back ({double (slot), seen.value / unit});
-    plot.model.push_back ({double (slot), exposed[slot]});
-    const Measured off = {seen.value / unit - exposed[slot],
-        std::hypot (error, seen.sigma / unit / std::sqrt (kParts))};
-    if (std::abs (off.value) > std::abs (worst.value)) {
-      worst = off;
-      differs = slot;
-    }
-    if (exposed[slot] < exposed[cut])
-      cut = slot;
-  }
-  finding.plots.push_back (std::move (plot));
-  finding.measure ("largest difference of a slot", worst,
-      "slot " + std::to_string (differs) + " of a still target is " +
-          fixed (100 * std::abs (worst.value), 1) + " % " +
-          (worst.value < 0 ? "darker" : "brighter") + " than it should be");
-  const double lost = 100.0 * (1.0 - exposed[cut]);
-  finding.measure ("light that a slot loses", {lost, 0.0},
-      "the exposure is over, or has not begun, in " + fixed (lost, 0) +
-          " % of slot " + std::to_string (cut));
-}
-
-void
-Slots::diagnose (Finding &finding) const
-{
-  if (const auto light = solve ())
-    return judge (*light, finding);
-  else
-    finding.notes.push_back (
-        {"slots", "Slots were not compared: " + light.error ().message + "."});
-  finding.add ("largest difference of a slot", kNotMeasured);
-}
 
 } // namespace
 

@@ -74,16 +74,193 @@ public:
   {
   }
 
-  Result<void> run ();
+  Result<void> run ()
+  {
+    ASSIGN_OR_RETURN (const bool found, find_part ());
+    const bool still = std::ranges::all_of (looks_, &Look::still);
+    if (looks_.size () > 1 && still && looks_[0].level > 0.0 &&
+        std::abs (light (looks_.size () - 1)) < 1.0) {
+      finding_.blame ("test-image",
+          "no pixel value changes, neither with the light nor from frame to "
+          "frame");
+      return {};
+    }
+    judge_bits ();
+    if (!found || !finding_.diagnoses.empty ())
+      return {};
+    /* A curve may be even about its middle, but not about two places. */
+    for (std::size_t i = part_; i < std::min (part_ + 2, kParts.size ()); i++) {
+      ASSIGN_OR_RETURN (excess_, compare (kParts[i]));
+      if (std::abs (excess_.value) - kSigmas * excess_.sigma > kBent)
+        break;
+    }
+    if (!(std::abs (excess_.value) - kSigmas * excess_.sigma > kBent))
+      return {};
+    ASSIGN_OR_RETURN (const bool steady, is_steady ());
+    if (!steady)
+      return {};
+    const bool follows_light = follows ();
+    if (!follows_light)
+      return name_bend ();
+    /* A gain multiplies noise, too; more light for a longer time does not. */
+    const Look &half = looks_.back ();
+    const Look &whole = *std::ranges::find_if (looks_.rbegin (), looks_.rend (),
+        [&half] (const Look &look) { return look.tiles == 2 * half.tiles; });
+    const double noisier =
+        (half.noise / std::max (1.0, half.level)) /
+        std::max (1e-9, whole.noise / std::max (1.0, whole.level));
+    const bool by_gain = noisier > kNoisier;
+    finding_.blame (by_gain ? "auto-gain" : "auto-exposure",
+        std::string ("after a change of the light, the camera changes its ") +
+            (by_gain ? "gain" : "exposure") + " by itself");
+    return {};
+  }
 
 private:
-  Result<bool> look_at (int first, int count);
-  Result<bool> find_part ();
-  Result<Measured> compare (const Part &part);
-  void judge_bits ();
-  Result<bool> is_steady ();
-  bool follows () const;
-  Result<void> name_bend ();
+  /** Adds a look at tiles [@p first, @p first + @p count); false: frames lack.
+   */
+  Result<bool> look_at (int first, int count)
+  {
+    RETURN_IF_ERROR (examination_.rig.show (
+        count > 0 ? lit (first, count) : no_light (), kTiles));
+    ASSIGN_OR_RETURN (auto seen, examination_.rig.watch (kFrames));
+    std::erase_if (seen, &SeenFrame::damaged);
+    if (int (seen.size ()) < kSettled)
+      return false;
+    Look look{.tiles = count};
+    for (const SeenFrame &frame : seen)
+      look.levels.push_back (mean_of (std::as_const (frame.picture).view ()));
+    for (std::size_t i = seen.size () - kSettled; i < seen.size (); i++) {
+      look.level += look.levels[i] / kSettled;
+      const Level level = level_of (seen[i].picture.view (), largest_);
+      look.full += level.saturated / kSettled;
+      look.most = std::uint16_t (look.most | level.bits_seen);
+    }
+    look.noise = variance_between (seen[seen.size () - 2], seen.back ());
+    look.still = look.noise == 0.0;
+    looks_.push_back (std::move (look));
+    return true;
+  }
+
+  /** The largest part of the period that does not saturate pixels. */
+  Result<bool> find_part ()
+  {
+    ASSIGN_OR_RETURN (bool known, look_at (0, 0));
+    for (; known && part_ < kParts.size (); part_++) {
+      ASSIGN_OR_RETURN (
+          known, look_at (kParts[part_].first, kParts[part_].count));
+      if (known && looks_.back ().full < kFull)
+        return true;
+    }
+    return false;
+  }
+
+  /** By how much the two halves of @p part exceed the whole, as a part of it.
+   */
+  Result<Measured> compare (const Part &part)
+  {
+    const int half = part.count / 2;
+    const Part shown[] = {{part.first, half}, part, {part.first + half, half}};
+    std::array<std::vector<double>, 3> lights;
+    for (int round = 0; round < kRounds; round++)
+      for (std::size_t i = 0; i < 3; i++) {
+        ASSIGN_OR_RETURN (
+            const bool known, look_at (shown[i].first, shown[i].count));
+        if (!known || looks_.back ().full >= kFull)
+          return kNotMeasured;
+        lights[i].push_back (light (looks_.size () - 1));
+      }
+    const Measured first = spread_of (lights[0]);
+    const Measured whole = spread_of (lights[1]);
+    const Measured second = spread_of (lights[2]);
+    if (whole.value < kFaint * largest_)
+      return kNotMeasured;
+    /* Of light that flickers, few looks tell the mean badly, and the halves
+     * differ. */
+    const double sigma = std::hypot (first.sigma, whole.sigma, second.sigma);
+    return Measured{(first.value + second.value) / whole.value - 1.0,
+        std::hypot (sigma, first.value - second.value) / whole.value};
+  }
+
+  /* Values that do not use the highest bits may be few electrons; but these
+   * have more noise. */
+  void judge_bits ()
+  {
+    constexpr double kLargestWell = 60e3; // electrons
+    if (looks_.size () < 2 || looks_[1].most == 0)
+      return;
+    const int used = std::bit_width (looks_[1].most);
+    const double light_seen = light (1);
+    const double full_well =
+        light_seen * largest_ / std::max (looks_[1].noise, 1.0 / 6.0);
+    if (largest_ > 255 && (largest_ >> used) >= 3 && light_seen > 16.0 &&
+        full_well > kLargestWell)
+      finding_.blame ("low-bits",
+          "pixel values stay below " + std::to_string (1 << used) + " of " +
+              std::to_string (largest_ + 1) +
+              ", and have the noise of a well that is nearly full: they are in "
+              "the lowest bits");
+  }
+
+  /** Whether the same light comes again and again: flicker that is nearly in
+   * step with the looks also makes halves that are no halves. */
+  Result<bool> is_steady ()
+  {
+    constexpr int kAgain = 5;
+    const auto [first, count] = kParts[part_];
+    std::vector<double> lights;
+    for (int i = 0; i < kAgain; i++) {
+      ASSIGN_OR_RETURN (const bool known, look_at (first, count / 2));
+      if (!known)
+        return false;
+      lights.push_back (light (looks_.size () - 1));
+    }
+    const Measured again = spread_of (lights);
+    return again.sigma < std::abs (excess_.value) / kSigmas * again.value;
+  }
+
+  /** Whether frames with more light than those before were brighter at first
+   * than later. With less light, a frame that is cut short may be darker. */
+  bool follows () const
+  {
+    int beyond = 0, steps = 0;
+    for (std::size_t i = 1; i < looks_.size (); i++) {
+      if (looks_[i].tiles <= looks_[i - 1].tiles)
+        continue;
+      const double from = looks_[i - 1].level, to = looks_[i].level;
+      const double high = *std::ranges::max_element (looks_[i].levels);
+      const double size = std::max (std::abs (to - from), kFaint * largest_);
+      steps++;
+      beyond += high > std::max (from, to) + kOvershoot * size;
+    }
+    return beyond > steps / 2;
+  }
+
+  Result<void> name_bend ()
+  {
+    std::vector<ResponsePoint> points;
+    const auto [first, most] = kParts[part_];
+    for (int count = 1; count <= most; count++) {
+      ASSIGN_OR_RETURN (
+          const bool known, look_at (first + (most - count) / 2, count));
+      if (known)
+        points.push_back ({double (count), light (looks_.size () - 1)});
+    }
+    const Bend bend = bend_of (points);
+    /* The check of the sensor measures a slight bow better. */
+    if (std::string_view (bend.id) == "nonlinear" &&
+        std::abs (excess_.value) < kBowed)
+      return {};
+    finding_.blame (
+        bend.id, "two halves of the light make " +
+                     fixed (100.0 * (1.0 + excess_.value), 0) +
+                     " % of the pixel value that both make together" +
+                     (std::string_view (bend.id) == "gamma"
+                             ? ", as with a gamma of " + fixed (bend.gamma, 2)
+                             : ": values are not proportional to light"));
+    return {};
+  }
+
   double light (std::size_t look) const
   {
     return looks_[look].level - looks_[0].level;
@@ -96,198 +273,6 @@ private:
   std::vector<Look> looks_;        // the first one: of the dark
   Measured excess_ = kNotMeasured; // of the halves over the whole, parts of it
 };
-
-/** Adds a look at tiles [@p first, @p first + @p count); false: frames lack. */
-Result<bool>
-ResponseRun::look_at (int first, int count)
-{
-  RETURN_IF_ERROR (examination_.rig.show (
-      count > 0 ? lit (first, count) : no_light (), kTiles));
-  ASSIGN_OR_RETURN (auto seen, examination_.rig.watch (kFrames));
-  std::erase_if (seen, &SeenFrame::damaged);
-  if (int (seen.size ()) < kSettled)
-    return false;
-  Look look{.tiles = count};
-  for (const SeenFrame &frame : seen)
-    look.levels.push_back (mean_of (std::as_const (frame.picture).view ()));
-  for (std::size_t i = seen.size () - kSettled; i < seen.size (); i++) {
-    look.level += look.levels[i] / kSettled;
-    const Level level = level_of (seen[i].picture.view (), largest_);
-    look.full += level.saturated / kSettled;
-    look.most = std::uint16_t (look.most | level.bits_seen);
-  }
-  look.noise = variance_between (seen[seen.size () - 2], seen.back ());
-  look.still = look.noise == 0.0;
-  looks_.push_back (std::move (look));
-  return true;
-}
-
-/** The largest part of the period that does not saturate pixels. */
-Result<bool>
-ResponseRun::find_part ()
-{
-  ASSIGN_OR_RETURN (bool known, look_at (0, 0));
-  for (; known && part_ < kParts.size (); part_++) {
-    ASSIGN_OR_RETURN (
-        known, look_at (kParts[part_].first, kParts[part_].count));
-    if (known && looks_.back ().full < kFull)
-      return true;
-  }
-  return false;
-}
-
-/** By how much the two halves of @p part exceed the whole, as a part of it. */
-Result<Measured>
-ResponseRun::compare (const Part &part)
-{
-  const int half = part.count / 2;
-  const Part shown[] = {{part.first, half}, part, {part.first + half, half}};
-  std::array<std::vector<double>, 3> lights;
-  for (int round = 0; round < kRounds; round++)
-    for (std::size_t i = 0; i < 3; i++) {
-      ASSIGN_OR_RETURN (
-          const bool known, look_at (shown[i].first, shown[i].count));
-      if (!known || looks_.back ().full >= kFull)
-        return kNotMeasured;
-      lights[i].push_back (light (looks_.size () - 1));
-    }
-  const Measured first = spread_of (lights[0]);
-  const Measured whole = spread_of (lights[1]);
-  const Measured second = spread_of (lights[2]);
-  if (whole.value < kFaint * largest_)
-    return kNotMeasured;
-  /* Of light that flickers, few looks tell the mean badly, and the halves
-   * differ. */
-  const double sigma = std::hypot (first.sigma, whole.sigma, second.sigma);
-  return Measured{(first.value + second.value) / whole.value - 1.0,
-      std::hypot (sigma, first.value - second.value) / whole.value};
-}
-
-/** Whether the same light comes again and again: flicker that is nearly in step
- * with the looks also makes halves that are no halves. */
-Result<bool>
-ResponseRun::is_steady ()
-{
-  constexpr int kAgain = 5;
-  const auto [first, count] = kParts[part_];
-  std::vector<double> lights;
-  for (int i = 0; i < kAgain; i++) {
-    ASSIGN_OR_RETURN (const bool known, look_at (first, count / 2));
-    if (!known)
-      return false;
-    lights.push_back (light (looks_.size () - 1));
-  }
-  const Measured again = spread_of (lights);
-  return again.sigma < std::abs (excess_.value) / kSigmas * again.value;
-}
-
-/** Whether frames with more light than those before were brighter at first than
- * later. With less light, a frame that is cut short may be darker. */
-bool
-ResponseRun::follows () const
-{
-  int beyond = 0, steps = 0;
-  for (std::size_t i = 1; i < looks_.size (); i++) {
-    if (looks_[i].tiles <= looks_[i - 1].tiles)
-      continue;
-    const double from = looks_[i - 1].level, to = looks_[i].level;
-    const double high = *std::ranges::max_element (looks_[i].levels);
-    const double size = std::max (std::abs (to - from), kFaint * largest_);
-    steps++;
-    beyond += high > std::max (from, to) + kOvershoot * size;
-  }
-  return beyond > steps / 2;
-}
-
-Result<void>
-ResponseRun::name_bend ()
-{
-  std::vector<ResponsePoint> points;
-  const auto [first, most] = kParts[part_];
-  for (int count = 1; count <= most; count++) {
-    ASSIGN_OR_RETURN (
-        const bool known, look_at (first + (most - count) / 2, count));
-    if (known)
-      points.push_back ({double (count), light (looks_.size () - 1)});
-  }
-  const Bend bend = bend_of (points);
-  /* The check of the sensor measures a slight bow better. */
-  if (std::string_view (bend.id) == "nonlinear" &&
-      std::abs (excess_.value) < kBowed)
-    return {};
-  finding_.blame (
-      bend.id, "two halves of the light make " +
-                   fixed (100.0 * (1.0 + excess_.value), 0) +
-                   " % of the pixel value that both make together" +
-                   (std::string_view (bend.id) == "gamma"
-                           ? ", as with a gamma of " + fixed (bend.gamma, 2)
-                           : ": values are not proportional to light"));
-  return {};
-}
-
-/* Values that do not use the highest bits may be few electrons; but these have
- * more noise. */
-void
-ResponseRun::judge_bits ()
-{
-  constexpr double kLargestWell = 60e3; // electrons
-  if (looks_.size () < 2 || looks_[1].most == 0)
-    return;
-  const int used = std::bit_width (looks_[1].most);
-  const double light_seen = light (1);
-  const double full_well =
-      light_seen * largest_ / std::max (looks_[1].noise, 1.0 / 6.0);
-  if (largest_ > 255 && (largest_ >> used) >= 3 && light_seen > 16.0 &&
-      full_well > kLargestWell)
-    finding_.blame ("low-bits",
-        "pixel values stay below " + std::to_string (1 << used) + " of " +
-            std::to_string (largest_ + 1) +
-            ", and have the noise of a well that is nearly full: they are in "
-            "the lowest bits");
-}
-
-Result<void>
-ResponseRun::run ()
-{
-  ASSIGN_OR_RETURN (const bool found, find_part ());
-  const bool still = std::ranges::all_of (looks_, &Look::still);
-  if (looks_.size () > 1 && still && looks_[0].level > 0.0 &&
-      std::abs (light (looks_.size () - 1)) < 1.0) {
-    finding_.blame ("test-image",
-        "no pixel value changes, neither with the light nor from frame to "
-        "frame");
-    return {};
-  }
-  judge_bits ();
-  if (!found || !finding_.diagnoses.empty ())
-    return {};
-  /* A curve may be even about its middle, but not about two places. */
-  for (std::size_t i = part_; i < std::min (part_ + 2, kParts.size ()); i++) {
-    ASSIGN_OR_RETURN (excess_, compare (kParts[i]));
-    if (std::abs (excess_.value) - kSigmas * excess_.sigma > kBent)
-      break;
-  }
-  if (!(std::abs (excess_.value) - kSigmas * excess_.sigma > kBent))
-    return {};
-  ASSIGN_OR_RETURN (const bool steady, is_steady ());
-  if (!steady)
-    return {};
-  const bool follows_light = follows ();
-  if (!follows_light)
-    return name_bend ();
-  /* A gain multiplies noise, too; more light for a longer time does not. */
-  const Look &half = looks_.back ();
-  const Look &whole = *std::ranges::find_if (looks_.rbegin (), looks_.rend (),
-      [&half] (const Look &look) { return look.tiles == 2 * half.tiles; });
-  const double noisier =
-      (half.noise / std::max (1.0, half.level)) /
-      std::max (1e-9, whole.noise / std::max (1.0, whole.level));
-  const bool by_gain = noisier > kNoisier;
-  finding_.blame (by_gain ? "auto-gain" : "auto-exposure",
-      std::string ("after a change of the light, the camera changes its ") +
-          (by_gain ? "gain" : "exposure") + " by itself");
-  return {};
-}
 
 /** The squares that remain if @p shape gives the values of 0..1. */
 template <typename Shape>

@@ -82,7 +82,8 @@ public:
   {
     finding_.notes.emplace_back ("not checked of the second camera",
         "conversion gain, full well, read noise, linearity and defects, as its "
-        "light cannot be dosed");
+        "light cannot be dosed; and off-state leakage, which is in its black "
+        "level");
     /* What follows from a fault is not judged. */
     for (const auto step : {&SecondRun::look_at_parts, &SecondRun::count_frames,
              &SecondRun::look_for_late_frames, &SecondRun::measure_light,
@@ -98,13 +99,7 @@ public:
     take_over (std::move (optics));
     if (other_.profile.mapping)
       compare_views (*other_.profile.mapping);
-    /* No recording of this camera follows, in which a few would be seen. */
-    const Reading *missing = finding_.reading ("second camera: missing frames");
-    if (missing && missing->number.value > 0.0)
-      finding_.blame ("lose",
-          "second camera: " + fixed (missing->number.value, 0) + " " +
-              missing->unit + " frames did not come",
-          Verdict::warn);
+    judge_losses ();
     finding_.sort ();
     BenchProfile &profile = other_.profile;
     profile.trigger_delay = examination_.profile.trigger_delay;
@@ -128,6 +123,33 @@ private:
     return look;
   }
 
+  /* Between new masks the trigger pauses. */
+  void count_losses (const std::vector<double> &times)
+  {
+    seen_ += std::int64_t (times.size ());
+    for (std::size_t k = 1; k < times.size (); k++)
+      lost_ += std::max<std::int64_t> (
+          0, std::llround ((times[k] - times[k - 1]) / period_) - 1);
+  }
+
+  /* No recording of this camera follows, in which a few would be seen. */
+  void judge_losses ()
+  {
+    finding_.readings.push_back ({"second camera: lost frames",
+        {double (lost_), 0.0}, "of " + std::to_string (seen_ + lost_)});
+    for (const char *name :
+        {"second camera: missing frames", "second camera: lost frames"}) {
+      const Reading *missing = finding_.reading (name);
+      if (!missing || missing->number.value <= 0.0)
+        continue;
+      finding_.blame ("lose",
+          "second camera: " + fixed (missing->number.value, 0) + " " +
+              missing->unit + " frames did not come",
+          Verdict::warn);
+      return;
+    }
+  }
+
   /* Both cameras send all the time; what is watched later has waited. */
   Result<Both> look (const StillMask &mask, int slots, int frames)
   {
@@ -142,6 +164,7 @@ private:
         numbers->erase (numbers->begin (),
             numbers->begin () +
                 std::min (int (numbers->size ()), examination_.lag));
+    count_losses (both.second.times);
     if (both.first.levels.empty ())
       return Error{"no frame came", ErrorCode::timeout};
     return both;
@@ -438,7 +461,8 @@ private:
   Rig &rig_, &second_;
   Examination other_;
   const double period_ = examination_.rig.parts ().period ();
-  Both on_, off_; // all mirrors
+  Both on_, off_;                    // all mirrors
+  std::int64_t seen_ = 0, lost_ = 0; // frames of the second camera
   Finding finding_ = {"second",
       "all mirrors on and off, light in each eighth of the period, and the "
       "complements of Gray codes and gratings"};

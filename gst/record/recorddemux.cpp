@@ -83,6 +83,8 @@ struct Stream {
   ClusterGate gate;        ///< of what is salvaged
   LargeFrames large;
   bool is_discont = false; ///< the next bytes that the demuxer gets are
+  bool is_over = false;    ///< what follows is another recording
+  bool said_over = false;
 };
 
 struct RecordDemuxState {
@@ -102,6 +104,7 @@ struct RecordDemuxState {
   GstPadEventFunction take_event = nullptr; ///< of the demuxer
 
   std::atomic<bool> has_new_frame = false;
+  std::atomic<bool> has_segment = false; ///< since a seek or a gap
 
   /* Streaming thread of the demuxer, and changes of the state: */
   Stream stream;
@@ -147,11 +150,34 @@ on_stored (GstPad *pad, GstPadProbeInfo *info, gpointer self) noexcept
 {
   if (!GST_BUFFER_PTS_IS_VALID (GST_PAD_PROBE_INFO_BUFFER (info)))
     return GST_PAD_PROBE_DROP;
-  const LargeFrames &large = state_in<Self> (self).stream.large;
+  const Stream &stream = state_in<Self> (self).stream;
+  if (stream.is_over)
+    return GST_PAD_PROBE_DROP;
   const ObjectPtr<GstElement> demuxer (gst_pad_get_parent_element (pad));
-  info->data = large.put_back (
+  info->data = stream.large.put_back (
       pad_of (demuxer.get (), "sink").get (), GST_PAD_PROBE_INFO_BUFFER (info));
   return info->data ? GST_PAD_PROBE_OK : GST_PAD_PROBE_HANDLED;
+}
+
+/* A demuxer goes on behind a recording without a length: it begins another
+ * segment without a seek. */
+GstPadProbeReturn
+on_segments (GstPad *, GstPadProbeInfo *info, gpointer self) noexcept
+{
+  auto &state = state_in<Self> (self);
+  Stream &stream = state.stream;
+  const GstEventType type = GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (info));
+  if (type == GST_EVENT_SEEK || type == GST_EVENT_FLUSH_STOP)
+    state.has_segment = false;
+  if (type != GST_EVENT_SEGMENT)
+    return GST_PAD_PROBE_OK;
+  stream.is_over = state.has_segment.exchange (true);
+  if (!stream.is_over || std::exchange (stream.said_over, true))
+    return GST_PAD_PROBE_OK;
+  POST_WARNING (self, STREAM, DEMUX,
+      "Behind the end of the recording, the file goes on with another one, "
+      "which is not read. Use each recording from a file of its own.");
+  return GST_PAD_PROBE_OK;
 }
 
 void
@@ -162,9 +188,11 @@ on_pad_added (GstElement *, GstPad *pad, gpointer self)
     gst_pad_add_probe (
         pad, GST_PAD_PROBE_TYPE_BUFFER, on_stored, self, nullptr);
   if (g_str_has_prefix (GST_OBJECT_NAME (pad), "video_") &&
-      !tracks.has_frames ())
+      !tracks.has_frames ()) {
+    gst_pad_add_probe (
+        pad, GST_PAD_PROBE_TYPE_EVENT_BOTH, on_segments, self, nullptr);
     add_frames (as<Self> (self), tracks, pad);
-  else if (is_text (pad))
+  } else if (is_text (pad))
     tracks.add_lines (pad);
 }
 
@@ -375,6 +403,7 @@ chain (GstPad *pad, GstObject *parent, GstBuffer *buffer) noexcept
     buffer = state.stream.large.pushed (buffer);
   /* Without it, a demuxer that runs again goes on with what it holds. */
   if (buffer && std::exchange (state.stream.is_discont, false)) {
+    state.has_segment = false;
     buffer = gst_buffer_make_writable (buffer);
     GST_BUFFER_FLAG_SET (buffer, GST_BUFFER_FLAG_DISCONT);
   }
@@ -431,7 +460,7 @@ begin_run (GstElement *self)
 {
   auto &state = state_in<Self> (self);
   state.stream = {};
-  state.has_new_frame = false;
+  state.has_new_frame = state.has_segment = false;
   state.coded.add_restore ();
   gst_ghost_pad_set_target (GST_GHOST_PAD (pad_of (self, "src").get ()),
       pad_of (state.coded.restore (), "src").get ());

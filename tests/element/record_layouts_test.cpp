@@ -371,6 +371,36 @@ TEST (RecordDemux, SaysWhatIsBehindTheEnd)
   std::filesystem::remove (path);
 }
 
+TEST (RecordDemux, SaysWhatIsBehindTheEndOfOneWithoutALength)
+{
+  const std::string path =
+      "/tmp/record_streams_test_" + std::to_string (getpid ()) + ".mkv";
+  for (const std::string codec : {"ffv1", "raw"}) {
+    ASSERT_EQ (Pipeline (five_frames (codec + " streamable=true") +
+                         "filesink location=" + path)
+                   .play (),
+        "");
+    std::string warnings;
+    const auto read = [&] {
+      Pipeline reading ("filesrc location=" + path +
+                        " ! codedexposure-recorddemux name=demux ! fakesink");
+      watch (reading["demux"].get (), add_warning, &warnings);
+      EXPECT_EQ (reading.play (), "");
+      EXPECT_EQ (counter_of (reading["demux"].get (), "frames"), 5u);
+    };
+    read ();
+    EXPECT_EQ (warnings, "");
+    std::string bytes (std::filesystem::file_size (path), '\0');
+    std::ifstream (path, std::ios::binary)
+        .read (bytes.data (), std::streamsize (bytes.size ()));
+    std::ofstream (path, std::ios::binary | std::ios::app) << bytes;
+    read ();
+    EXPECT_NE (
+        warnings.find ("another one, which is not read"), std::string::npos);
+    std::filesystem::remove (path);
+  }
+}
+
 TEST (RecordDemux, SaysThatItDoesNotReadAnotherVideo)
 {
   const std::string path =

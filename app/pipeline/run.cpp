@@ -337,8 +337,11 @@ goes_on (const Job &job, GstMessage *stream_cut)
     return gst_object_has_as_ancestor (
         GST_MESSAGE_SRC (stream_cut), GST_OBJECT (job.reader));
   };
+  /* Those of a second camera end on their own. */
   const auto has_more = [&] {
-    return info->times.size () > counter_of (job.reader, "frames");
+    return !gst_structure_has_field (
+               gst_message_get_structure (stream_cut), "camera") &&
+           info->times.size () > counter_of (job.reader, "frames");
   };
   return info && (info->is_damaged ||
                      (job.is_finished && (!is_of_reader () || has_more ())));

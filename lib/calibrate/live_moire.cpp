@@ -101,42 +101,37 @@ struct Phasors {
     return std::norm (z) > kFaint * kFaint * reference * reference;
   }
 
-  std::complex<double> product (int lag_x, int lag_y) const;
-  double slope (bool along_y) const;
-};
-
-/* Sum of the products of each phasor with the one @lag_x, @lag_y further. */
-std::complex<double>
-Phasors::product (int lag_x, int lag_y) const
-{
-  std::complex<double> sum = 0.0;
-  for (int r = 0; r + lag_y < all.height (); r++) {
-    const Phasor *here = all.view ().row (r);
-    const Phasor *there = all.view ().row (r + lag_y) + lag_x;
-    float re = 0.0f, im = 0.0f;
-    for (int c = 0; c + lag_x < all.width (); c++) {
-      re += here[c].real () * there[c].real () +
-            here[c].imag () * there[c].imag ();
-      im += here[c].real () * there[c].imag () -
-            here[c].imag () * there[c].real ();
+  /* Sum of the products of each phasor with the one @lag_x, @lag_y further. */
+  std::complex<double> product (int lag_x, int lag_y) const
+  {
+    std::complex<double> sum = 0.0;
+    for (int r = 0; r + lag_y < all.height (); r++) {
+      const Phasor *here = all.view ().row (r);
+      const Phasor *there = all.view ().row (r + lag_y) + lag_x;
+      float re = 0.0f, im = 0.0f;
+      for (int c = 0; c + lag_x < all.width (); c++) {
+        re += here[c].real () * there[c].real () +
+              here[c].imag () * there[c].imag ();
+        im += here[c].real () * there[c].imag () -
+              here[c].imag () * there[c].real ();
+      }
+      sum += std::complex<double> (re, im);
     }
-    sum += std::complex<double> (re, im);
+    return sum;
   }
-  return sum;
-}
 
-/* Radians from block to block, from longer and longer baselines. */
-double
-Phasors::slope (bool along_y) const
-{
-  double slope = 0.0;
-  const int length = along_y ? all.height () : all.width ();
-  for (int lag = 1; lag <= length / 2; lag *= 4) {
-    const auto sum = along_y ? product (0, lag) : product (lag, 0);
-    slope += std::arg (sum * std::polar (1.0, -lag * slope)) / lag;
+  /* Radians from block to block, from longer and longer baselines. */
+  double slope (bool along_y) const
+  {
+    double slope = 0.0;
+    const int length = along_y ? all.height () : all.width ();
+    for (int lag = 1; lag <= length / 2; lag *= 4) {
+      const auto sum = along_y ? product (0, lag) : product (lag, 0);
+      slope += std::arg (sum * std::polar (1.0, -lag * slope)) / lag;
+    }
+    return slope;
   }
-  return slope;
-}
+};
 
 /* phase = a xi + b eta + c, in coordinates relative to the frame's centre. */
 struct Plane {
@@ -174,21 +169,19 @@ struct PlaneSums {
     squares += row.squares;
   }
   double variance () const { return squares / normal (2, 2); }
-  std::optional<Plane> solve () const;
-};
 
-/* None if the blocks do not determine a plane. */
-std::optional<Plane>
-PlaneSums::solve () const
-{
-  constexpr double kMinPivot = 1e-12;
-  const Eigen::LDLT<Eigen::Matrix3d> factor (normal);
-  const Eigen::Vector3d pivots = factor.vectorD ();
-  if (!(pivots.minCoeff () > kMinPivot * pivots.maxCoeff ()))
-    return std::nullopt;
-  return Plane{
-      factor.solve (right), factor.solve (Eigen::Matrix3d::Identity ())};
-}
+  /* None if the blocks do not determine a plane. */
+  std::optional<Plane> solve () const
+  {
+    constexpr double kMinPivot = 1e-12;
+    const Eigen::LDLT<Eigen::Matrix3d> factor (normal);
+    const Eigen::Vector3d pivots = factor.vectorD ();
+    if (!(pivots.minCoeff () > kMinPivot * pivots.maxCoeff ()))
+      return std::nullopt;
+    return Plane{
+        factor.solve (right), factor.solve (Eigen::Matrix3d::Identity ())};
+  }
+};
 
 /* Sine of the phase of @z after a rotation by @back; beyond 90 degrees, 1. */
 double
@@ -207,11 +200,11 @@ struct LiveMoire::State {
   State (const Mapping &where, const LiveMoireOptions &how, int samples)
       : expected (where), options (how), carrier (samples),
         blocks_x (where.camera ().width / samples),
-        blocks_y (where.camera ().height / samples), x{double (samples),
-                                                         0.5 * (samples - 1),
-                                                         {blocks_x - 1,
-                                                             blocks_y}},
-        y{0.5 * (samples - 1), double (samples), {blocks_x, blocks_y - 1}},
+        blocks_y (where.camera ().height / samples),
+        x (Phasors{
+            double (samples), 0.5 * (samples - 1), {blocks_x - 1, blocks_y}}),
+        y (Phasors{
+            0.5 * (samples - 1), double (samples), {blocks_x, blocks_y - 1}}),
         columns (std::size_t (blocks_x * samples)), row_sums (columns),
         rising (std::size_t (blocks_x))
   {
@@ -229,248 +222,230 @@ struct LiveMoire::State {
   std::vector<Phasor> rising;
   std::vector<float> sorted;
 
+  /* Phasors of the whole frame, T rows at a time. */
   template <typename Pixel>
-  void collect (ImageView<const Pixel> frame);
-  void demodulate_x (int block_row);
-  void demodulate_y (int block_row);
-  Result<void> find_grating (Phasors &phasors, const char *name);
-  Plane start (const Phasors &phasors, double sign, bool along_y) const;
-  Result<Plane> fit (const Phasors &phasors, double sign, bool along_y) const;
-  double refine (
-      const Phasors &phasors, Plane &plane, double sign, double limit) const;
-  Result<Mapping> combine (const Plane &px, const Plane &py) const;
-  template <typename Pixel>
-  Result<LiveReading> solve (ImageView<const Pixel> frame);
-};
-
-/* Phasors of the whole frame, T rows at a time. */
-template <typename Pixel>
-void
-LiveMoire::State::collect (ImageView<const Pixel> frame)
-{
-  const int samples = carrier.period;
-  const int width = blocks_x * samples;
-  sum = 0.0;
-  for (int r = 0; r < blocks_y; r++) {
-    std::fill (columns.begin (), columns.end (), 0.0f);
-    for (int t = 0; t < samples; t++) {
-      const Pixel *row = frame.row (r * samples + t);
-      float *sums = row_sums.data () + std::ptrdiff_t (t) * blocks_x;
-      for (int i = 0; i < width; i++)
-        columns[std::size_t (i)] += float (row[i]);
-      for (int c = 0; c < blocks_x; c++) {
-        std::uint32_t total = 0;
-        for (int i = 0; i < samples; i++)
-          total += row[c * samples + i];
-        sums[c] = float (total);
+  void collect (ImageView<const Pixel> frame)
+  {
+    const int samples = carrier.period;
+    const int width = blocks_x * samples;
+    sum = 0.0;
+    for (int r = 0; r < blocks_y; r++) {
+      std::fill (columns.begin (), columns.end (), 0.0f);
+      for (int t = 0; t < samples; t++) {
+        const Pixel *row = frame.row (r * samples + t);
+        float *sums = row_sums.data () + std::ptrdiff_t (t) * blocks_x;
+        for (int i = 0; i < width; i++)
+          columns[std::size_t (i)] += float (row[i]);
+        for (int c = 0; c < blocks_x; c++) {
+          std::uint32_t total = 0;
+          for (int i = 0; i < samples; i++)
+            total += row[c * samples + i];
+          sums[c] = float (total);
+        }
       }
+      for (int c = 0; c < width; c++)
+        sum += double (columns[std::size_t (c)]);
+      demodulate_x (r);
+      demodulate_y (r);
     }
-    for (int c = 0; c < width; c++)
-      sum += double (columns[std::size_t (c)]);
-    demodulate_x (r);
-    demodulate_y (r);
   }
-}
 
-void
-LiveMoire::State::demodulate_x (int block_row)
-{
-  Phasor *out = x.all.view ().row (block_row);
-  Phasor before = 0.0f;
-  for (int c = 0; c < blocks_x; c++) {
-    Phasor whole, rise;
-    carrier.demodulate (columns.data () + c * carrier.period, 1, whole, rise);
-    if (c > 0)
-      out[c - 1] = before + whole - rise;
-    before = rise;
-  }
-}
-
-void
-LiveMoire::State::demodulate_y (int block_row)
-{
-  for (int c = 0; c < blocks_x; c++) {
-    Phasor whole, rise;
-    carrier.demodulate (
-        row_sums.data () + c, std::size_t (blocks_x), whole, rise);
-    if (block_row > 0)
-      y.all.at (c, block_row - 1) = rising[std::size_t (c)] + whole - rise;
-    rising[std::size_t (c)] = rise;
-  }
-}
-
-/* Fills the maps of phase and amplitude; error if there is no grating. */
-Result<void>
-LiveMoire::State::find_grating (Phasors &phasors, const char *name)
-{
-  const float to_amplitude = 2.0f / float (carrier.period * carrier.period);
-  phasors.power = 0.0;
-  sorted.clear ();
-  each_pixel (phasors.all, [&] (int c, int r) {
-    const Phasor z = phasors.all.at (c, r);
-    const float norm = std::norm (z);
-    const float size = std::sqrt (norm);
-    phasors.power += double (norm);
-    phasors.fringes.phase.at (c, r) = std::atan2 (z.imag (), z.real ());
-    phasors.fringes.amplitude.at (c, r) = to_amplitude * size;
-    sorted.push_back (size);
-  });
-  const auto high = sorted.begin () + std::ptrdiff_t (sorted.size () * 9 / 10);
-  std::nth_element (sorted.begin (), high, sorted.end ());
-  phasors.reference = *high;
-
-  const double common =
-      std::abs (phasors.product (1, 0)) + std::abs (phasors.product (0, 1));
-  if (phasors.power > 0.0 && common > 2.0 * kCoherent * phasors.power)
-    return {};
-  return Error{std::string ("no grating is seen in ") + name +
-               ": show a grating with a period of " +
-               std::to_string (options.period) +
-               " mirrors, focus on the mirrors, and bring magnification and "
-               "rotation close to the expected ones"};
-}
-
-Plane
-LiveMoire::State::start (
-    const Phasors &phasors, double sign, bool along_y) const
-{
-  const auto [cx, cy, r] = CentredFrame (expected.camera ());
-  double slope_x = phasors.slope (false), slope_y = phasors.slope (true);
-  const double step = carrier.period;
-
-  std::complex<double> mean = 0.0;
-  each_pixel (phasors.all, [&] (int i, int j) {
-    mean += std::complex<double> (phasors.all.at (i, j)) *
-            std::polar (1.0, -(slope_x * i + slope_y * j));
-  });
-  const double origin = std::arg (mean) -
-                        slope_x * (phasors.first_x - cx) / step -
-                        slope_y * (phasors.first_y - cy) / step;
-  /* One period of the carrier per block is invisible in the phasors. */
-  (along_y ? slope_y : slope_x) += kTwoPi;
-  Plane plane;
-  plane.at = Eigen::Vector3d{sign * slope_x / step * r,
-      sign * slope_y / step * r,
-      sign *
-          (origin +
-              kTwoPi * (along_y ? cy - phasors.first_y : cx - phasors.first_x) /
-                  step)};
-  return plane;
-}
-
-/* One round of least squares on the residuals of @plane below @limit; returns
- * their variance, or -1 where they do not determine a plane. */
-double
-LiveMoire::State::refine (
-    const Phasors &phasors, Plane &plane, double sign, double limit) const
-{
-  const auto [cx, cy, r] = CentredFrame (expected.camera ());
-  const double step = carrier.period / r;
-  const double xi0 = (phasors.first_x - cx) / r;
-  const Phasor rotation (std::polar (1.0, -sign * plane.at[0] * step));
-  PlaneSums sums;
-  for (int j = 0; j < phasors.all.height (); j++) {
-    const double eta = (phasors.first_y - cy) / r + j * step;
-    Phasor back (std::polar (
-        1.0, -sign * (plane.at[0] * xi0 + plane.at[1] * eta + plane.at[2])));
-    RowSums row;
-    for (int i = 0; i < phasors.all.width (); i++, back *= rotation) {
-      const Phasor z = phasors.all.at (i, j);
-      const double rest = rest_of (z, back);
-      if (phasors.is_seen (z) && std::abs (rest) <= limit)
-        row.add (xi0 + i * step, rest);
+  void demodulate_x (int block_row)
+  {
+    Phasor *out = x.all.view ().row (block_row);
+    Phasor before = 0.0f;
+    for (int c = 0; c < blocks_x; c++) {
+      Phasor whole, rise;
+      carrier.demodulate (columns.data () + c * carrier.period, 1, whole, rise);
+      if (c > 0)
+        out[c - 1] = before + whole - rise;
+      before = rise;
     }
-    sums.add (row, eta);
   }
-  const auto change = sums.solve ();
-  if (!change)
-    return -1.0;
-  plane.at += sign * change->at;
-  plane.covariance = change->covariance;
-  return sums.variance ();
-}
 
-Result<Plane>
-LiveMoire::State::fit (const Phasors &phasors, double sign, bool along_y) const
-{
-  Plane plane = start (phasors, sign, along_y);
-  /* The limit shrinks, so that blocks at the edge of the array are left out. */
-  double variance = 1.0;
-  for (int round = 0; round < 4 && variance >= 0.0; round++)
-    variance = refine (phasors, plane, sign, 3.0 * std::sqrt (variance));
-  if (!(variance >= 0.0))
-    return Error{"the grating is seen in too small a part of the frame"};
-  plane.covariance *= variance * carrier.overlap ();
-  return plane;
-}
-
-/* The mapping from the phases of both gratings. */
-Result<Mapping>
-LiveMoire::State::combine (const Plane &px, const Plane &py) const
-{
-  const double to_mirrors = options.period / kTwoPi;
-  /* Mirror of phase 0: the middle of those that are bright. */
-  const double origin = 0.5 * (options.period / 2 - 1) +
-                        (options.off_beam ? options.period / 2 : 0);
-  const Homography known = expected.centred ();
-  Homography h = {0, 0, 0, 0, 0, 0, 0, 0, 1};
-  Mapping::Covariance covariance = {};
-  Eigen::Map<Eigen::Matrix<double, Mapping::kParameters, Mapping::kParameters>>
-      all (covariance.data ());
-  const Plane *planes[] = {&px, &py};
-  for (Eigen::Index d = 0; d < 2; d++) {
-    Eigen::Map<Eigen::Vector3d> (h.data () + 3 * d) =
-        to_mirrors * planes[d]->at;
-    const Eigen::Matrix3d &noise = planes[d]->covariance;
-    all.block<3, 3> (3 * d, 3 * d) =
-        to_mirrors * to_mirrors / 2.0 * (noise + noise.transpose ());
-    const auto at = std::size_t (3 * d + 2);
-    h[at] += origin;
-    h[at] += options.period * std::round ((known[at] - h[at]) / options.period);
-  }
-  ASSIGN_OR_RETURN (const Mapping mapping,
-      Mapping::from_centred (expected.camera (), expected.mirrors (), h));
-  return Mapping::make ({expected.camera (), expected.mirrors (),
-      mapping.homography (), covariance});
-}
-
-template <typename Pixel>
-Result<LiveReading>
-LiveMoire::State::solve (ImageView<const Pixel> frame)
-{
-  const Extent camera = expected.camera ();
-  RETURN_IF_ERROR (
-      check_view (ViewBytes::of (frame), "frame", camera.width, camera.height));
-  collect (frame);
-  for (const auto &[phasors, name] : {std::pair (&x, "x"), std::pair (&y, "y")})
-    RETURN_IF_ERROR (find_grating (*phasors, name));
-
-  const Homography known = expected.centred ();
-  ASSIGN_OR_RETURN (
-      const Plane plane_x, fit (x, known[0] < 0.0 ? -1.0 : 1.0, false));
-  ASSIGN_OR_RETURN (
-      const Plane plane_y, fit (y, known[4] < 0.0 ? -1.0 : 1.0, true));
-  ASSIGN_OR_RETURN (Mapping mapping, combine (plane_x, plane_y));
-
-  LiveReading reading = {std::move (mapping), {}, 0.0, 0};
-  const double pixels =
-      double (blocks_x) * blocks_y * carrier.period * carrier.period;
-  const double largest =
-      sum / pixels * 4.0 / std::numbers::pi * sinc (1.0 / carrier.period);
-  const double to_contrast =
-      2.0 / (carrier.period * carrier.period * std::max (1e-9, largest));
-  reading.contrast = {
-      to_contrast * double (x.reference), to_contrast * double (y.reference)};
-  std::size_t seen = 0, all = 0;
-  for (const Phasors *phasors : {&x, &y})
-    for (const Phasor z : phasors->all.pixels ()) {
-      seen += phasors->is_seen (z);
-      all++;
+  void demodulate_y (int block_row)
+  {
+    for (int c = 0; c < blocks_x; c++) {
+      Phasor whole, rise;
+      carrier.demodulate (
+          row_sums.data () + c, std::size_t (blocks_x), whole, rise);
+      if (block_row > 0)
+        y.all.at (c, block_row - 1) = rising[std::size_t (c)] + whole - rise;
+      rising[std::size_t (c)] = rise;
     }
-  reading.coverage = double (seen) / double (all);
-  reading.saturated = count_saturated (frame, options.bits);
-  return reading;
-}
+  }
+
+  /* Fills the maps of phase and amplitude; error if there is no grating. */
+  Result<void> find_grating (Phasors &phasors, const char *name)
+  {
+    const float to_amplitude = 2.0f / float (carrier.period * carrier.period);
+    phasors.power = 0.0;
+    sorted.clear ();
+    each_pixel (phasors.all, [&] (int c, int r) {
+      const Phasor z = phasors.all.at (c, r);
+      const float norm = std::norm (z);
+      const float size = std::sqrt (norm);
+      phasors.power += double (norm);
+      phasors.fringes.phase.at (c, r) = std::atan2 (z.imag (), z.real ());
+      phasors.fringes.amplitude.at (c, r) = to_amplitude * size;
+      sorted.push_back (size);
+    });
+    const auto high =
+        sorted.begin () + std::ptrdiff_t (sorted.size () * 9 / 10);
+    std::nth_element (sorted.begin (), high, sorted.end ());
+    phasors.reference = *high;
+
+    const double common =
+        std::abs (phasors.product (1, 0)) + std::abs (phasors.product (0, 1));
+    if (phasors.power > 0.0 && common > 2.0 * kCoherent * phasors.power)
+      return {};
+    return Error{std::string ("no grating is seen in ") + name +
+                 ": show a grating with a period of " +
+                 std::to_string (options.period) +
+                 " mirrors, focus on the mirrors, and bring magnification and "
+                 "rotation close to the expected ones"};
+  }
+
+  Plane start (const Phasors &phasors, double sign, bool along_y) const
+  {
+    const auto [cx, cy, r] = CentredFrame (expected.camera ());
+    double slope_x = phasors.slope (false), slope_y = phasors.slope (true);
+    const double step = carrier.period;
+
+    std::complex<double> mean = 0.0;
+    each_pixel (phasors.all, [&] (int i, int j) {
+      mean += std::complex<double> (phasors.all.at (i, j)) *
+              std::polar (1.0, -(slope_x * i + slope_y * j));
+    });
+    const double origin = std::arg (mean) -
+                          slope_x * (phasors.first_x - cx) / step -
+                          slope_y * (phasors.first_y - cy) / step;
+    /* One period of the carrier per block is invisible in the phasors. */
+    (along_y ? slope_y : slope_x) += kTwoPi;
+    Plane plane;
+    plane.at = Eigen::Vector3d{sign * slope_x / step * r,
+        sign * slope_y / step * r,
+        sign * (origin +
+                   kTwoPi *
+                       (along_y ? cy - phasors.first_y : cx - phasors.first_x) /
+                       step)};
+    return plane;
+  }
+
+  Result<Plane> fit (const Phasors &phasors, double sign, bool along_y) const
+  {
+    Plane plane = start (phasors, sign, along_y);
+    /* The limit shrinks, so that blocks at the edge of the array are left out.
+     */
+    double variance = 1.0;
+    for (int round = 0; round < 4 && variance >= 0.0; round++)
+      variance = refine (phasors, plane, sign, 3.0 * std::sqrt (variance));
+    if (!(variance >= 0.0))
+      return Error{"the grating is seen in too small a part of the frame"};
+    plane.covariance *= variance * carrier.overlap ();
+    return plane;
+  }
+
+  /* One round of least squares on the residuals of @plane below @limit; returns
+   * their variance, or -1 where they do not determine a plane. */
+  double refine (
+      const Phasors &phasors, Plane &plane, double sign, double limit) const
+  {
+    const auto [cx, cy, r] = CentredFrame (expected.camera ());
+    const double step = carrier.period / r;
+    const double xi0 = (phasors.first_x - cx) / r;
+    const Phasor rotation (std::polar (1.0, -sign * plane.at[0] * step));
+    PlaneSums sums;
+    for (int j = 0; j < phasors.all.height (); j++) {
+      const double eta = (phasors.first_y - cy) / r + j * step;
+      Phasor back (std::polar (
+          1.0, -sign * (plane.at[0] * xi0 + plane.at[1] * eta + plane.at[2])));
+      RowSums row;
+      for (int i = 0; i < phasors.all.width (); i++, back *= rotation) {
+        const Phasor z = phasors.all.at (i, j);
+        const double rest = rest_of (z, back);
+        if (phasors.is_seen (z) && std::abs (rest) <= limit)
+          row.add (xi0 + i * step, rest);
+      }
+      sums.add (row, eta);
+    }
+    const auto change = sums.solve ();
+    if (!change)
+      return -1.0;
+    plane.at += sign * change->at;
+    plane.covariance = change->covariance;
+    return sums.variance ();
+  }
+
+  /* The mapping from the phases of both gratings. */
+  Result<Mapping> combine (const Plane &px, const Plane &py) const
+  {
+    const double to_mirrors = options.period / kTwoPi;
+    /* Mirror of phase 0: the middle of those that are bright. */
+    const double origin = 0.5 * (options.period / 2 - 1) +
+                          (options.off_beam ? options.period / 2 : 0);
+    const Homography known = expected.centred ();
+    Homography h = {0, 0, 0, 0, 0, 0, 0, 0, 1};
+    Mapping::Covariance covariance = {};
+    Eigen::Map<
+        Eigen::Matrix<double, Mapping::kParameters, Mapping::kParameters>>
+        all (covariance.data ());
+    const Plane *planes[] = {&px, &py};
+    for (Eigen::Index d = 0; d < 2; d++) {
+      Eigen::Map<Eigen::Vector3d> (h.data () + 3 * d) =
+          to_mirrors * planes[d]->at;
+      const Eigen::Matrix3d &noise = planes[d]->covariance;
+      all.block<3, 3> (3 * d, 3 * d) =
+          to_mirrors * to_mirrors / 2.0 * (noise + noise.transpose ());
+      const auto at = std::size_t (3 * d + 2);
+      h[at] += origin;
+      h[at] +=
+          options.period * std::round ((known[at] - h[at]) / options.period);
+    }
+    ASSIGN_OR_RETURN (const Mapping mapping,
+        Mapping::from_centred (expected.camera (), expected.mirrors (), h));
+    return Mapping::make ({expected.camera (), expected.mirrors (),
+        mapping.homography (), covariance});
+  }
+
+  template <typename Pixel>
+  Result<LiveReading> solve (ImageView<const Pixel> frame)
+  {
+    const Extent camera = expected.camera ();
+    RETURN_IF_ERROR (check_view (
+        ViewBytes::of (frame), "frame", camera.width, camera.height));
+    collect (frame);
+    for (const auto &[phasors, name] :
+        {std::pair (&x, "x"), std::pair (&y, "y")})
+      RETURN_IF_ERROR (find_grating (*phasors, name));
+
+    const Homography known = expected.centred ();
+    ASSIGN_OR_RETURN (
+        const Plane plane_x, fit (x, known[0] < 0.0 ? -1.0 : 1.0, false));
+    ASSIGN_OR_RETURN (
+        const Plane plane_y, fit (y, known[4] < 0.0 ? -1.0 : 1.0, true));
+    ASSIGN_OR_RETURN (Mapping mapping, combine (plane_x, plane_y));
+
+    LiveReading reading = {std::move (mapping), {}, 0.0, 0};
+    const double pixels =
+        double (blocks_x) * blocks_y * carrier.period * carrier.period;
+    const double largest =
+        sum / pixels * 4.0 / std::numbers::pi * sinc (1.0 / carrier.period);
+    const double to_contrast =
+        2.0 / (carrier.period * carrier.period * std::max (1e-9, largest));
+    reading.contrast = {
+        to_contrast * double (x.reference), to_contrast * double (y.reference)};
+    std::size_t seen = 0, all = 0;
+    for (const Phasors *phasors : {&x, &y})
+      for (const Phasor z : phasors->all.pixels ()) {
+        seen += phasors->is_seen (z);
+        all++;
+      }
+    reading.coverage = double (seen) / double (all);
+    reading.saturated = count_saturated (frame, options.bits);
+    return reading;
+  }
+};
 
 Result<LiveMoire>
 LiveMoire::make (const Mapping &expected, const LiveMoireOptions &options)

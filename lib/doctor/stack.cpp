@@ -10,28 +10,6 @@
 namespace codedexposure
 {
 
-namespace
-{
-
-/* Parts of a common change of light that pixels get; their mean is 1. */
-Image<float>
-weights_of (const Image<float> &mean, const Image<float> *dark, int largest)
-{
-  Image<float> weights (mean.width (), mean.height ());
-  const double light =
-      dark ? mean_of (mean.view ()) - mean_of (dark->view ()) : 0.0;
-  const bool lit = light > 0.02 * largest;
-  each_pixel (mean, [&] (int x, int y) {
-    weights.at (x, y) =
-        lit ? float (
-                  (double (mean.at (x, y)) - double (dark->at (x, y))) / light)
-            : 1.0f;
-  });
-  return weights;
-}
-
-} // namespace
-
 void
 StackSum::add (const SeenFrame &frame)
 {
@@ -92,9 +70,15 @@ StackSum::stack (const Image<float> *dark) &&
   });
   stack_.mean = std::move (sum_);
   first_ = {};
-  const Image<float> weights = weights_of (stack_.mean, dark, largest_);
+  const double light =
+      dark ? mean_of (stack_.mean.view ()) - mean_of (dark->view ()) : 0.0;
+  const bool is_lit = light > 0.02 * largest_;
   each_pixel (squares_, [&] (int x, int y) {
-    const float weight = weights.at (x, y);
+    /* The part of a common change of light that the pixel gets. */
+    const float weight = is_lit ? float ((double (stack_.mean.at (x, y)) -
+                                             double (dark->at (x, y))) /
+                                         light)
+                                : 1.0f;
     const float rest = squares_.at (x, y) -
                        2.0f * weight * products_.at (x, y) +
                        weight * weight * float (of_levels);

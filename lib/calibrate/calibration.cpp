@@ -43,15 +43,12 @@ smoothed (const Image<float> &image)
   Image<float> out (image.width (), image.height ());
   for (int y0 = 0; y0 < image.height (); y0 += kSmooth)
     for (int x0 = 0; x0 < image.width (); x0 += kSmooth) {
-      const int y1 = std::min (image.height (), y0 + kSmooth);
-      const int x1 = std::min (image.width (), x0 + kSmooth);
-      double sum = 0.0;
-      for (int y = y0; y < y1; y++)
-        for (int x = x0; x < x1; x++)
-          sum += double (image.at (x, y));
-      const float mean = float (sum / ((y1 - y0) * (x1 - x0)));
-      for (int y = y0; y < y1; y++)
-        std::fill (out.view ().row (y) + x0, out.view ().row (y) + x1, mean);
+      const int width = std::min (kSmooth, image.width () - x0);
+      const int height = std::min (kSmooth, image.height () - y0);
+      const auto square = out.view ().block (x0, y0, width, height);
+      const auto mean =
+          float (mean_of (image.view ().block (x0, y0, width, height)));
+      each_pixel (square, [&] (int x, int y) { square.at (x, y) = mean; });
     }
   return out;
 }

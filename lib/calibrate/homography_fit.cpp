@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "calibrate/homography_fit.h"
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 #include <vector>
 

@@ -201,9 +201,11 @@ private:
     if (!dithered_)
       add (dark_means_, leak_slots, 0.0);
     for (const Level &level : levels_)
-      if (!plateau_ || level.means.mean < 0.9 * *plateau_)
-        add (level.means, level.slots * drift_at (level.time) + leak_slots,
+      if (!plateau_ || level.means.mean < 0.9 * *plateau_) {
+        const double time = double (level.time - start_) * 1e-9 - drift_from_;
+        add (level.means, level.slots * (1.0 + drift_ * time) + leak_slots,
             level.scatter);
+      }
     if (dithered_)
       all.push_back ({0.0, {dithered_->black.value, kDarkError}});
     else if (leak)
@@ -235,11 +237,6 @@ private:
     point.mean.sigma = std::hypot (std::hypot (rounding, times),
         std::hypot (kLightError * light, scatter));
     return point;
-  }
-
-  double drift_at (Nanoseconds time) const
-  {
-    return 1.0 + drift_ * (double (time - start_) * 1e-9 - drift_from_);
   }
 
   double signal (const StackMeans &means) const

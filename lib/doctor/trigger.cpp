@@ -227,16 +227,12 @@ private:
     return false;
   }
 
-  Result<void> sample (int first, int count, int exposure, int frames)
-  {
-    return runs_.see (lit (first, count), exposure, frames);
-  }
-
   Result<void> sample_tiles (int exposure)
   {
     const int count = grid_ / kTiles;
     for (int tile = 0; tile < kTiles; tile++)
-      RETURN_IF_ERROR (sample (tile * count, count, exposure, kCoarseFrames));
+      RETURN_IF_ERROR (
+          runs_.see (lit (tile * count, count), exposure, kCoarseFrames));
     return {};
   }
 
@@ -248,7 +244,8 @@ private:
     const int end = std::min (grid_, at + grid_ / kTiles);
     for (const int aside : {-2, 0, 1, 2, 4})
       if (const int first = std::max (at + aside, 0); first < end)
-        RETURN_IF_ERROR (sample (first, end - first, exposure, kFineFrames));
+        RETURN_IF_ERROR (
+            runs_.see (lit (first, end - first), exposure, kFineFrames));
     return {};
   }
 
@@ -261,7 +258,8 @@ private:
     const int first = std::max (at - grid_ / kTiles, 0);
     for (const int aside : {-4, -2, -1, 0, 2})
       if (const int until = std::min (at + aside, grid_); until > first)
-        RETURN_IF_ERROR (sample (first, until - first, exposure, kFineFrames));
+        RETURN_IF_ERROR (
+            runs_.see (lit (first, until - first), exposure, kFineFrames));
     return {};
   }
 

@@ -13,7 +13,8 @@
 namespace codedexposure::app
 {
 
-/** What --help says of a command, in its order. */
+/** What --help says of a command, in its order. A description and notes may
+ * begin with a line break, which is not shown. */
 struct CommandText {
   std::string name;
   /** One line for the list of commands; empty: the command is not listed. */
@@ -21,10 +22,9 @@ struct CommandText {
   /** After "codedexposure NAME": "[option...] RECORDING.mkv --output OUT". */
   std::string usage;
   std::string description;
-  /** After the options: a list of exit statuses, keys ... */
+  /** After the options: a list of exit statuses, and examples of the form
+   * "  What it shows:\n    codedexposure NAME ...". */
   std::string notes = {};
-  /** Lines of the form "  What it shows:\n    codedexposure NAME ...". */
-  std::string examples = {};
 };
 
 /** A subcommand: its options, and what it does. */
@@ -40,13 +40,13 @@ struct Command {
   std::function<void (const std::vector<std::string> &)> run_with = nullptr;
 };
 
-/** That of a class with text (), declare () and run (). */
+/** That of a class with declare () and run (). */
 template <typename Class>
 Command
-make_command ()
+make_command (CommandText text)
 {
   const auto made = std::make_shared<Class> ();
-  return {Class::text (),
+  return {std::move (text),
       [made] (Options &options) { made->declare (options); },
       [made] { return made->run (); }};
 }

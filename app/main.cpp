@@ -36,24 +36,29 @@ struct Node {
 };
 
 void
+print_list (const std::vector<Node> &nodes)
+{
+  for (const Node &node : nodes)
+    if (const CommandText &text = node.command.text; !text.summary.empty ())
+      std::printf ("  %-18s  %s\n", text.name.c_str (), text.summary.c_str ());
+}
+
+void
 print_help (const Node &node)
 {
   const CommandText &text = node.command.text;
+  const auto shown = [] (const std::string &of) {
+    return of.c_str () + (of.starts_with ('\n') ? 1 : 0);
+  };
   std::printf ("Usage: %s %s\n%s", node.path.c_str (), text.usage.c_str (),
-      text.description.c_str ());
+      shown (text.description));
   if (!node.below.empty ())
     std::printf ("\n");
-  for (const Node &below : node.below)
-    if (const CommandText &listed = below.command.text;
-        !listed.summary.empty ())
-      std::printf (
-          "  %-18s  %s\n", listed.name.c_str (), listed.summary.c_str ());
+  print_list (node.below);
   std::printf ("%s  -h, --help          show this help\n",
       node.options->help ().c_str ());
   if (!text.notes.empty ())
-    std::printf ("\n%s", text.notes.c_str ());
-  if (!text.examples.empty ())
-    std::printf ("\nExamples:\n%s", text.examples.c_str ());
+    std::printf ("\n%s", shown (text.notes));
 }
 
 void
@@ -64,9 +69,7 @@ print_commands (const std::vector<Node> &nodes)
                "frames of a camera\nbehind a digital micromirror device "
                "(DMD).\n\nCommands:\n",
       kName);
-  for (const Node &node : nodes)
-    if (const CommandText &text = node.command.text; !text.summary.empty ())
-      std::printf ("  %-18s  %s\n", text.name.c_str (), text.summary.c_str ());
+  print_list (nodes);
   std::printf ("\n  -h, --help          show this help, or that of a COMMAND\n"
                "  --version           show the version\n");
 }
@@ -137,8 +140,10 @@ const Node *
 chosen (const std::vector<Node> &nodes)
 {
   for (const Node &node : nodes)
-    if (node.app->parsed ())
-      return &node;
+    if (node.app->parsed ()) {
+      const Node *below = chosen (node.below);
+      return below ? below : &node;
+    }
   return nullptr;
 }
 
@@ -172,25 +177,23 @@ run (int argc, char **argv)
   std::string path = kName;
   const Node *node = nullptr;
   try {
-    for (const Node &each : nodes)
-      if (argc > 1 && each.command.run_with &&
-          each.command.text.name == argv[1])
-        each.command.run_with ({argv + 2, argv + argc});
-    /* From "--" on, words are another program's, which CLI11 would read. */
     int own = argc;
-    for (const Node &each : nodes)
-      if (argc > 1 && each.command.text.name == argv[1] &&
-          each.options->takes_rest ()) {
+    for (const Node &each : nodes) {
+      if (argc < 2 || each.command.text.name != argv[1])
+        continue;
+      if (each.command.run_with)
+        each.command.run_with ({argv + 2, argv + argc});
+      /* From "--" on, words are another program's, which CLI11 would read. */
+      if (each.options->takes_rest ()) {
         own = int (
             std::find (argv + 2, argv + argc, std::string_view ("--")) - argv);
         each.options->end_rest ({argv + own, argv + argc});
       }
+    }
     try {
       app.parse (own, argv);
     } catch (const CLI::ParseError &error) {
       node = chosen (nodes);
-      while (const Node *below = node ? chosen (node->below) : nullptr)
-        node = below;
       if (node)
         path = node->path;
       /* --help wins over what is missing beside it. */
@@ -210,8 +213,6 @@ run (int argc, char **argv)
       print_commands (nodes);
       return 0;
     }
-    while (const Node *below = chosen (node->below))
-      node = below;
     path = node->path;
     if (node->app->count ("--help") > 0) {
       print_help (*node);

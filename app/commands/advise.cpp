@@ -18,7 +18,10 @@ namespace codedexposure::app
 namespace
 {
 
-struct Arguments : Printing, BoardOptions {
+struct Advise : Printing, BoardOptions {
+  void declare (Options &options);
+  Exit run ();
+
   Conditions conditions;
   std::vector<std::string> schedules;
   Nanoseconds readout = 0;
@@ -38,7 +41,7 @@ struct Finding {
 
 /** The schedules to compare: those on the command line, else the usual ones. */
 std::vector<Schedule>
-candidates (const Arguments &arguments, const DmdInfo &board)
+candidates (const Advise &arguments, const DmdInfo &board)
 {
   if (arguments.schedules.empty ())
     return usual_schedules (board.minimum_switching, arguments.readout);
@@ -63,7 +66,7 @@ use_bench (Camera &camera, const BenchProfile &bench)
 
 /** What is on the command line wins over the bench profile. */
 void
-use_options (Camera &camera, const Arguments &arguments)
+use_options (Camera &camera, const Advise &arguments)
 {
   camera.size = arguments.size.value_or (camera.size);
   camera.bits = arguments.bits.value_or (camera.bits);
@@ -151,7 +154,7 @@ print_table (const std::vector<Finding> &findings)
 
 /* Explains the recommendation. */
 std::string
-reason (const Prediction *best, const Arguments &arguments)
+reason (const Prediction *best, const Advise &arguments)
 {
   if (!best)
     return format (
@@ -169,7 +172,7 @@ reason (const Prediction *best, const Arguments &arguments)
 }
 
 Exit
-show (const Arguments &arguments, const std::vector<Finding> &findings)
+show (const Advise &arguments, const std::vector<Finding> &findings)
 {
   std::vector<Prediction> predictions;
   Json list = Json::array ();
@@ -192,98 +195,73 @@ show (const Arguments &arguments, const std::vector<Finding> &findings)
 }
 
 Exit
-advise (Arguments arguments)
+Advise::run ()
 {
   const std::stop_token stop = stop_at_signals ();
-  Conditions &conditions = arguments.conditions;
-  std::optional<BenchProfile> bench;
-  if (arguments.bench) {
-    bench = value_of (BenchProfile::parse (*arguments.bench), Exit::usage);
-    use_bench (conditions.camera, *bench);
-    if (const auto old = bench->why_doubtful (now_utc ()))
-      arguments.say (*old);
+  std::optional<BenchProfile> profile;
+  if (bench) {
+    profile = value_of (BenchProfile::parse (*bench), Exit::usage);
+    use_bench (conditions.camera, *profile);
+    if (const auto old = profile->why_doubtful (now_utc ()))
+      say (*old);
   }
-  use_options (conditions.camera, arguments);
-  const DmdInfo board = arguments.info ();
-  auto schedules = candidates (arguments, board);
-  if (bench)
-    for (Schedule &schedule : schedules)
-      schedule = value_of (bench->with_leak (schedule), Exit::usage);
+  use_options (conditions.camera, *this);
+  const DmdInfo board = info ();
+  auto compared = candidates (*this, board);
+  if (profile)
+    for (Schedule &schedule : compared)
+      schedule = value_of (profile->with_leak (schedule), Exit::usage);
   /* The prediction without masks fails only if the conditions are invalid. */
   const Prediction none =
       value_of (predict (std::nullopt, conditions), Exit::usage);
 
   std::vector<Finding> findings{{none.text (), none}};
-  for (const Schedule &schedule : schedules) {
+  for (const Schedule &schedule : compared) {
     if (stop.stop_requested ())
       fail ("interrupted", Exit::interrupted);
     findings.push_back (
         {schedule.text (), predict_on (board, schedule, conditions)});
   }
-  return show (arguments, findings);
+  return show (*this, findings);
 }
-
-class Advise
-{
-public:
-  static CommandText text ()
-  {
-    return {.name = "advise",
-        .summary = "predict the accuracy of schedules and recommend one",
-        .usage = "[option...] [SCHEDULE...]",
-        .description =
-            "Predicts the accuracy of schedules [the usual ones] for a camera, "
-            "its light and\na scene, and recommends one. Exit status 4: none "
-            "can be recommended.\n",
-        .examples =
-            "  The best schedule for a fast scene with little light:\n"
-            "    codedexposure advise --speed 400 --light 0.3 --dmd dlp3000\n"};
-  }
-  void declare (Options &options);
-  Exit run () { return advise (arguments_); }
-
-private:
-  Arguments arguments_;
-};
 
 void
 Advise::declare (Options &options)
 {
-  Arguments &a = arguments_;
   constexpr double kMost = 1e12;
   const Rule<double> at_least_0 = real (0, kMost, "a number of at least 0");
-  options.words (a.schedules);
+  options.words (schedules);
   options.heading ("");
-  options.value ("--bench", a.bench, "FILE",
+  options.value ("--bench", bench, "FILE",
       "bench profile with size, bits, full well, read noise and leakage; other "
       "options and a leak of a schedule win");
   options.value (
-      "--size", a.size, "WxH", "size of the camera [768x576]", picture_size ());
-  a.declare_rate (options);
-  options.value ("--full-well", a.full_well, "E",
+      "--size", size, "WxH", "size of the camera [768x576]", picture_size ());
+  declare_rate (options);
+  options.value ("--full-well", full_well, "E",
       "full-well capacity of a pixel, e- [10000]", at_least_0);
   options.value (
-      "--read-noise", a.read_noise, "E", "read noise, e- rms [5]", at_least_0);
-  options.value ("--bits", a.bits, "N", "bits of a pixel [8]", whole (1, 16));
-  options.value ("--readout", a.readout, "TIME",
+      "--read-noise", read_noise, "E", "read noise, e- rms [5]", at_least_0);
+  options.value ("--bits", bits, "N", "bits of a pixel [8]", whole (1, 16));
+  options.value ("--readout", readout, "TIME",
       "dead time of the camera at the end of a frame, such as 500us [0]",
       time_rule ());
-  a.declare_board (options);
-  options.value ("--light", a.conditions.light, "F",
+  declare_board (options);
+  options.value ("--light", conditions.light, "F",
       "electrons at white in a frame without masks, as a part of the full well "
       "[1]",
       at_least_0);
-  options.value ("--speed", a.conditions.scene.speed, "V",
+  options.value ("--speed", conditions.scene.speed, "V",
       "speed of motion, pixels of the coded frame per second", at_least_0);
-  options.value ("--detail", a.conditions.scene.detail, "P",
+  options.value ("--detail", conditions.scene.detail, "P",
       "size of details, pixels of the coded frame", at_least_0);
-  options.value ("--contrast", a.conditions.scene.contrast, "F",
+  options.value ("--contrast", conditions.scene.contrast, "F",
       "standard deviation of the scene, as a part of white", at_least_0);
-  options.value ("--level", a.conditions.scene.level, "F",
+  options.value ("--level", conditions.scene.level, "F",
       "mean of the scene, as a part of white", at_least_0);
   options.value (
-      "--min-rate", a.min_rate, "R", "min subframes/s [0]", at_least_0);
-  a.Printing::declare (options);
+      "--min-rate", min_rate, "R", "min subframes/s [0]", at_least_0);
+  Printing::declare (options);
 }
 
 } // namespace
@@ -291,7 +269,18 @@ Advise::declare (Options &options)
 Command
 advise_command ()
 {
-  return make_command<Advise> ();
+  return make_command<Advise> ({.name = "advise",
+      .summary = "predict the accuracy of schedules and recommend one",
+      .usage = "[option...] [SCHEDULE...]",
+      .description = R"(
+Predicts the accuracy of schedules [the usual ones] for a camera, its light and
+a scene, and recommends one. Exit status 4: none can be recommended.
+)",
+      .notes = R"(
+Examples:
+  The best schedule for a fast scene with little light:
+    codedexposure advise --speed 400 --light 0.3 --dmd dlp3000
+)"});
 }
 
 } // namespace codedexposure::app

@@ -34,7 +34,6 @@ namespace
 class Bench
 {
 public:
-  static CommandText text ();
   void declare (Options &options);
   Exit run ();
 
@@ -70,39 +69,6 @@ private:
   std::vector<Camera> open_;
   std::unique_ptr<ServedBench> served_;
 };
-
-CommandText
-Bench::text ()
-{
-  return {.name = "bench",
-      .summary = "run a command with an emulated camera, and a board",
-      .usage = "[option...] [--] [COMMAND...]",
-      .description =
-          "Runs COMMAND together with an emulated GigE Vision camera. The "
-          "camera serves\ncoded frames of the simulated bench; "
-          "codedexposure-camerasrc\ncamera-name=127.0.0.1 reads it. With "
-          "--dmd, it sees the mirrors of a board on\nan emulated USB, which "
-          "triggers it, and faults make this bench ill. Both run in\na "
-          "network namespace with only the loopback interface, so the search "
-          "for cameras\ndoes not reach other machines.\nWithout COMMAND, "
-          "\"codedexposure live\" shows the picture of the camera.\n",
-      .notes = "Exit status: that of COMMAND; 1 if the camera cannot be "
-               "started, 2 wrong usage.\n",
-      .examples =
-          "  Record the emulated camera:\n"
-          "    codedexposure bench codedexposure record --camera 127.0.0.1 \\\n"
-          "      --frames 50 --output gige.mkv\n"
-          "  The same, with three frames that are lost and one that comes "
-          "late:\n"
-          "    codedexposure bench --faults \"lose@10:3 delay@30:5ms\" \\\n"
-          "      codedexposure record --camera 127.0.0.1 --frames 50 \\\n"
-          "      --output faults.mkv\n"
-          "  A pipeline of your own, with a camera of 12 bits:\n"
-          "    codedexposure bench --bits 12 gst-launch-1.0 "
-          "codedexposure-camerasrc \\\n"
-          "      camera-name=127.0.0.1 pixel-format=Mono12 num-buffers=50 ! "
-          "fakesink\n"};
-}
 
 void
 Bench::declare (Options &options)
@@ -363,7 +329,33 @@ Bench::run ()
 Command
 bench_command ()
 {
-  return make_command<Bench> ();
+  return make_command<Bench> ({.name = "bench",
+      .summary = "run a command with an emulated camera, and a board",
+      .usage = "[option...] [--] [COMMAND...]",
+      .description = R"(
+Runs COMMAND together with an emulated GigE Vision camera. The camera serves
+coded frames of the simulated bench; codedexposure-camerasrc
+camera-name=127.0.0.1 reads it. With --dmd, it sees the mirrors of a board on
+an emulated USB, which triggers it, and faults make this bench ill. Both run in
+a network namespace with only the loopback interface, so the search for cameras
+does not reach other machines.
+Without COMMAND, "codedexposure live" shows the picture of the camera.
+)",
+      .notes = R"(
+Exit status: that of COMMAND; 1 if the camera cannot be started, 2 wrong usage.
+
+Examples:
+  Record the emulated camera:
+    codedexposure bench codedexposure record --camera 127.0.0.1 \
+      --frames 50 --output gige.mkv
+  The same, with three frames that are lost and one that comes late:
+    codedexposure bench --faults "lose@10:3 delay@30:5ms" \
+      codedexposure record --camera 127.0.0.1 --frames 50 \
+      --output faults.mkv
+  A pipeline of your own, with a camera of 12 bits:
+    codedexposure bench --bits 12 gst-launch-1.0 codedexposure-camerasrc \
+      camera-name=127.0.0.1 pixel-format=Mono12 num-buffers=50 ! fakesink
+)"});
 }
 
 } // namespace codedexposure::app

@@ -23,7 +23,6 @@ constexpr double kWhite = 0.8;
 class Calibrate
 {
 public:
-  static CommandText text ();
   void declare (Options &options);
   Exit run ();
 
@@ -43,34 +42,6 @@ private:
   SecondCamera beside_; // whose mapping is second_
   std::optional<double> mirror_pitch_, tolerance_;
 };
-
-CommandText
-Calibrate::text ()
-{
-  return {.name = "calibrate",
-      .summary = "align the camera with the mirrors and measure the mapping",
-      .usage = "[option...]",
-      .description =
-          "Guides you through the alignment of camera and mirrors. It shows a "
-          "grating on\nthe DMD and displays the fringes and the required stage "
-          "travel, in a window and\non the terminal. When the camera is "
-          "aligned, or when you press Enter, it shows\nthe calibration "
-          "patterns, returns the mirrors to the schedule and writes the\n"
-          "mapping. The mapping corrects the remaining misalignment:\n"
-          "  codedexposure-demux mapping=FILE\n\nUse a plain, bright, static "
-          "target. Nothing may move in the picture.\nBy default, the simulated "
-          "bench is misaligned and has noise; with --bench, it is\nthe one "
-          "that was measured.\n",
-      .examples =
-          "  The simulated bench, which moves its own stage:\n"
-          "    codedexposure calibrate --size 384x288 --output simulated.json\n"
-          "  The mapping as the bench stands, without alignment:\n"
-          "    codedexposure calibrate --size 384x288 --mode map \\\n"
-          "      --output mapping.json\n"
-          "  A camera and a DMD on the USB; you move the stage:\n"
-          "    codedexposure calibrate --camera \"Allied Vision-0123456789\" "
-          "\\\n      --device usb: --size 768x576 --output camera.json\n"};
-}
 
 void
 Calibrate::declare (Options &options)
@@ -240,7 +211,32 @@ Calibrate::run ()
 Command
 calibrate_command ()
 {
-  return make_command<Calibrate> ();
+  return make_command<Calibrate> ({.name = "calibrate",
+      .summary = "align the camera with the mirrors and measure the mapping",
+      .usage = "[option...]",
+      .description = R"(
+Guides you through the alignment of camera and mirrors. It shows a grating on
+the DMD and displays the fringes and the required stage travel, in a window and
+on the terminal. When the camera is aligned, or when you press Enter, it shows
+the calibration patterns, returns the mirrors to the schedule and writes the
+mapping. The mapping corrects the remaining misalignment:
+  codedexposure-demux mapping=FILE
+
+Use a plain, bright, static target. Nothing may move in the picture.
+By default, the simulated bench is misaligned and has noise; with --bench, it is
+the one that was measured.
+)",
+      .notes = R"(
+Examples:
+  The simulated bench, which moves its own stage:
+    codedexposure calibrate --size 384x288 --output simulated.json
+  The mapping as the bench stands, without alignment:
+    codedexposure calibrate --size 384x288 --mode map \
+      --output mapping.json
+  A camera and a DMD on the USB; you move the stage:
+    codedexposure calibrate --camera "Allied Vision-0123456789" \
+      --device usb: --size 768x576 --output camera.json
+)"});
 }
 
 } // namespace codedexposure::app

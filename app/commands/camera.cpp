@@ -280,31 +280,32 @@ camera_command ()
           .summary = "list the cameras, and show how one is set",
           .usage = "COMMAND [option...] [CAMERA]",
           .description = "GenICam cameras, on GigE Vision and USB3 Vision.\n",
-          .notes = "Exit status: 0 done, 2 wrong usage, 3 there is no such "
-                   "camera.\n",
-          .examples = "  Which cameras are there:\n"
-                      "    codedexposure camera list\n"
-                      "  The emulated one, as JSON:\n"
-                      "    codedexposure bench codedexposure camera list "
-                      "--json\n"
-                      "  How it is set:\n"
-                      "    codedexposure bench codedexposure camera show "
-                      "127.0.0.1\n"},
+          .notes = R"(
+Exit status: 0 done, 2 wrong usage, 3 there is no such camera.
+
+Examples:
+  Which cameras are there:
+    codedexposure camera list
+  The emulated one, as JSON:
+    codedexposure bench codedexposure camera list --json
+  How it is set:
+    codedexposure bench codedexposure camera show 127.0.0.1
+)"},
       {{{.name = "list",
             .summary = "list the GenICam cameras that answer",
             .usage = "[option...]",
-            .description = "Lists the GenICam cameras on the network and the "
-                           "USB: the name "
-                           "for --camera, the\nsensor, the grey formats, and "
-                           "whether a DMD "
-                           "can trigger it.\n"},
+            .description = R"(
+Lists the GenICam cameras on the network and the USB: the name for --camera, the
+sensor, the grey formats, and whether a DMD can trigger it.
+)"},
            [] (Options &options, Arguments &a) { a.declare (options); }, list},
           {{.name = "show",
                .summary = "show how a camera is set",
                .usage = "[option...] CAMERA",
-               .description =
-                   "Shows what a camera can do and how it is set, with the "
-                   "features that change\ncoded frames. Nothing is changed.\n"},
+               .description = R"(
+Shows what a camera can do and how it is set, with the features that change
+coded frames. Nothing is changed.
+)"},
               [] (Options &options, Arguments &a) {
                 options.word ("CAMERA", a.name);
                 a.declare (options);

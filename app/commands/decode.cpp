@@ -27,7 +27,6 @@ namespace
 class Decode
 {
 public:
-  static CommandText text ();
   void declare (Options &options);
   Exit run ();
 
@@ -55,35 +54,6 @@ private:
   /* Pictures whose flags are lost with their form. */
   std::atomic<guint64> unflagged_ = 0;
 };
-
-CommandText
-Decode::text ()
-{
-  return {.name = "decode",
-      .summary = "decode a recording to pictures at N times the frame rate",
-      .usage = "[option...] RECORDING.mkv --output OUT\n"
-               "       codedexposure decode [--schedule S] RECORDING.mkv "
-               "--find-phase",
-      .description =
-          "Splits the coded frames of a recording into subframes. The "
-          "recording contains\nthe schedule. The ending of OUT selects the "
-          "format: .mkv (FFV1, lossless), .mp4\n(H.264, for viewing), .ome.tif "
-          "(OME-TIFF), .h5 (HDF5) or .ome.zarr (OME-Zarr)\nfor other "
-          "programs, FOLDER/ or NAME%06d.png (pictures).\n",
-      .notes = "Exit status: 0 all decoded, 1 failed, 2 wrong usage, 3 the "
-               "recording is cut off\nor damaged, and was decoded as far as "
-               "possible, 4 no coded frame lies in the\npart, 130 stopped "
-               "before the end: what was decoded is in OUT.part.\n",
-      .examples =
-          "  A video of 100 frames/s, to look at:\n"
-          "    codedexposure decode coded.mkv --output fast.mp4\n"
-          "  A fifth of a second as single pictures:\n"
-          "    codedexposure decode coded.mkv --start 1 --duration 0.2 \\\n"
-          "      --output pictures/\n"
-          "  Full-size frames, lossless:\n"
-          "    codedexposure decode coded.mkv --fuse balanced --duration 0.2 "
-          "\\\n      --output full.mkv\n"};
-}
 
 void
 Decode::declare (Options &options)
@@ -419,7 +389,32 @@ Decode::run ()
 Command
 decode_command ()
 {
-  return make_command<Decode> ();
+  return make_command<Decode> ({.name = "decode",
+      .summary = "decode a recording to pictures at N times the frame rate",
+      .usage = "[option...] RECORDING.mkv --output OUT\n"
+               "       codedexposure decode [--schedule S] RECORDING.mkv "
+               "--find-phase",
+      .description = R"(
+Splits the coded frames of a recording into subframes. The recording contains
+the schedule. The ending of OUT selects the format: .mkv (FFV1, lossless), .mp4
+(H.264, for viewing), .ome.tif (OME-TIFF), .h5 (HDF5) or .ome.zarr (OME-Zarr)
+for other programs, FOLDER/ or NAME%06d.png (pictures).
+)",
+      .notes = R"(
+Exit status: 0 all decoded, 1 failed, 2 wrong usage, 3 the recording is cut off
+or damaged, and was decoded as far as possible, 4 no coded frame lies in the
+part, 130 stopped before the end: what was decoded is in OUT.part.
+
+Examples:
+  A video of 100 frames/s, to look at:
+    codedexposure decode coded.mkv --output fast.mp4
+  A fifth of a second as single pictures:
+    codedexposure decode coded.mkv --start 1 --duration 0.2 \
+      --output pictures/
+  Full-size frames, lossless:
+    codedexposure decode coded.mkv --fuse balanced --duration 0.2 \
+      --output full.mkv
+)"});
 }
 
 } // namespace codedexposure::app

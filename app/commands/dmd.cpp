@@ -384,20 +384,21 @@ dmd_command ()
             [&entry] (Arguments &arguments) {
               return run_command (arguments, entry.run);
             }});
-  return make_group<Arguments> (
-      {.name = "dmd",
-          .summary = "list and control DMD boards",
-          .usage = "COMMAND [option...] [DEVICE]",
-          .description =
-              "DEVICE is usb:[PORT|SERIAL], lightcrafter:[ADDRESS] or "
-              "sim:NAME, "
-              "followed by\noptions such as ,master=camera [usb:, the only "
-              "board on the USB].\n",
-          .notes = "Exit status: 0 done, 1 the device failed, 2 wrong usage, 3 "
-                   "there is no such\ndevice, 4 the schedule does not fit, 130 "
-                   "interrupted.\n",
-          .examples = "  A test of a board, here of the simulated one:\n"
-                      "    codedexposure dmd selftest sim:bench\n"},
+  return make_group<Arguments> ({.name = "dmd",
+                                    .summary = "list and control DMD boards",
+                                    .usage = "COMMAND [option...] [DEVICE]",
+                                    .description = R"(
+DEVICE is usb:[PORT|SERIAL], lightcrafter:[ADDRESS] or sim:NAME, followed by
+options such as ,master=camera [usb:, the only board on the USB].
+)",
+                                    .notes = R"(
+Exit status: 0 done, 1 the device failed, 2 wrong usage, 3 there is no such
+device, 4 the schedule does not fit, 130 interrupted.
+
+Examples:
+  A test of a board, here of the simulated one:
+    codedexposure dmd selftest sim:bench
+)"},
       below);
 }
 

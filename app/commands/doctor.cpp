@@ -33,7 +33,6 @@ namespace
 class Doctor
 {
 public:
-  static CommandText text ();
   void declare (Options &options);
   Exit run ();
 
@@ -74,38 +73,6 @@ private:
   std::optional<BenchProfile> profile_;
   std::optional<RigParts> parts_;
 };
-
-CommandText
-Doctor::text ()
-{
-  return {.name = "doctor",
-      .summary = "examine a bench, and measure its numbers",
-      .usage = "[option...]",
-      .description =
-          "Examines a bench, one check after the other: it shows masks on the "
-          "DMD, looks at\nthem with the camera, and says what it saw, whether "
-          "that is good (PASS, WARN,\nFAIL or UNKNOWN), what is the most "
-          "likely cause of a fault, and what to try\nnext. Writes a page with "
-          "all figures, FOLDER/index.html, and, unless a check\nfailed, the "
-          "bench profile FOLDER/bench.json, which the other commands can "
-          "use.\nTakes less than three minutes at 25 frames/s. docs/doctor.md "
-          "explains the\nchecks.\n\nPlace a plain, bright target before the "
-          "bench; nothing may move. Ctrl-C ends it\nand parks the mirrors. "
-          "Without --camera, it examines a simulated bench.\n",
-      .notes =
-          "Exit status: 0 all is good, or worth a warning; 1 a check failed, "
-          "or could not\nbe made; 2 wrong usage; 4 none failed, but of one or "
-          "more it is not known;\n130 stopped.\n",
-      .examples =
-          "  A camera and a DMD on the USB:\n"
-          "    codedexposure doctor --camera \"Allied Vision-0123456789\" \\\n"
-          "      --device usb: --output bench\n"
-          "  Only the trigger, after a cable was changed, without questions:\n"
-          "    codedexposure doctor --camera \"Allied Vision-0123456789\" \\\n"
-          "      --device usb: --only trigger --yes --force\n"
-          "  A simulated bench, whose numbers are drawn by a seed:\n"
-          "    codedexposure doctor --seed 7 --output simulated\n"};
-}
 
 void
 Doctor::declare (Options &options)
@@ -439,7 +406,36 @@ Doctor::run ()
 Command
 doctor_command ()
 {
-  return make_command<Doctor> ();
+  return make_command<Doctor> ({.name = "doctor",
+      .summary = "examine a bench, and measure its numbers",
+      .usage = "[option...]",
+      .description = R"(
+Examines a bench, one check after the other: it shows masks on the DMD, looks at
+them with the camera, and says what it saw, whether that is good (PASS, WARN,
+FAIL or UNKNOWN), what is the most likely cause of a fault, and what to try
+next. Writes a page with all figures, FOLDER/index.html, and, unless a check
+failed, the bench profile FOLDER/bench.json, which the other commands can use.
+Takes less than three minutes at 25 frames/s. docs/doctor.md explains the
+checks.
+
+Place a plain, bright target before the bench; nothing may move. Ctrl-C ends it
+and parks the mirrors. Without --camera, it examines a simulated bench.
+)",
+      .notes = R"(
+Exit status: 0 all is good, or worth a warning; 1 a check failed, or could not
+be made; 2 wrong usage; 4 none failed, but of one or more it is not known;
+130 stopped.
+
+Examples:
+  A camera and a DMD on the USB:
+    codedexposure doctor --camera "Allied Vision-0123456789" \
+      --device usb: --output bench
+  Only the trigger, after a cable was changed, without questions:
+    codedexposure doctor --camera "Allied Vision-0123456789" \
+      --device usb: --only trigger --yes --force
+  A simulated bench, whose numbers are drawn by a seed:
+    codedexposure doctor --seed 7 --output simulated
+)"});
 }
 
 } // namespace codedexposure::app

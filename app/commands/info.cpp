@@ -30,28 +30,6 @@ codec_text (MatroskaHead::Codec codec)
 class Info
 {
 public:
-  static CommandText text ()
-  {
-    return {.name = "info",
-        .summary = "show what a recording says of itself",
-        .usage = "[option...] RECORDING.mkv...",
-        .description = "Shows the codec, size, rate, length and schedule of "
-                       "recordings, without decoding\n"
-                       "them. One that is cut off is damaged, too; a complete "
-                       "one is not, and has as\n"
-                       "many frames, of each camera, as were recorded, by its "
-                       "last line. With --json,\n"
-                       "a list with an object for each; one that is no "
-                       "recording has the key \"error\".\n"
-                       "Exit status 1: one of them is none.\n",
-        .examples = "  For people:\n"
-                    "    codedexposure info coded.mkv\n"
-                    "  All recordings of a day:\n"
-                    "    codedexposure info day1/*.mkv\n"
-                    "  For programs, with the time of each coded frame:\n"
-                    "    codedexposure info --json --times coded.mkv\n"};
-  }
-
   void declare (Options &options)
   {
     options.words (paths_);
@@ -128,7 +106,25 @@ private:
 Command
 info_command ()
 {
-  return make_command<Info> ();
+  return make_command<Info> ({.name = "info",
+      .summary = "show what a recording says of itself",
+      .usage = "[option...] RECORDING.mkv...",
+      .description = R"(
+Shows the codec, size, rate, length and schedule of recordings, without decoding
+them. One that is cut off is damaged, too; a complete one is not, and has as
+many frames, of each camera, as were recorded, by its last line. With --json,
+a list with an object for each; one that is no recording has the key "error".
+Exit status 1: one of them is none.
+)",
+      .notes = R"(
+Examples:
+  For people:
+    codedexposure info coded.mkv
+  All recordings of a day:
+    codedexposure info day1/*.mkv
+  For programs, with the time of each coded frame:
+    codedexposure info --json --times coded.mkv
+)"});
 }
 
 } // namespace codedexposure::app

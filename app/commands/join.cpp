@@ -41,6 +41,7 @@ public:
     gst_element_set_state (job_.graph.pipeline (), GST_STATE_PLAYING);
   }
   ~Part () { gst_element_set_state (job_.graph.pipeline (), GST_STATE_NULL); }
+
   Part (const Part &) = delete;
   Part &operator= (const Part &) = delete;
 
@@ -112,6 +113,7 @@ public:
         "handle-segment-change", TRUE, nullptr);
     g_signal_connect (source, "need-data", G_CALLBACK (on_need_data), this);
   }
+
   Feeder (const Feeder &) = delete;
   Feeder &operator= (const Feeder &) = delete;
 
@@ -245,16 +247,6 @@ private:
 class Join
 {
 public:
-  static CommandText text ()
-  {
-    return {.name = "join",
-        .summary = "",
-        .usage = "[option...] PART.mkv... --output OUT",
-        .description =
-            "Puts lossless videos of excerpts together, as one run of decode "
-            "would have written\nthem, and prints what they hold as JSON.\n"};
-  }
-
   void declare (Options &options)
   {
     options.words (parts_);
@@ -304,7 +296,13 @@ private:
 Command
 join_command ()
 {
-  return make_command<Join> ();
+  return make_command<Join> ({.name = "join",
+      .summary = "",
+      .usage = "[option...] PART.mkv... --output OUT",
+      .description = R"(
+Puts lossless videos of excerpts together, as one run of decode would have written
+them, and prints what they hold as JSON.
+)"});
 }
 
 } // namespace codedexposure::app

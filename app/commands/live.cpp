@@ -16,7 +16,6 @@ namespace
 class Live
 {
 public:
-  static CommandText text ();
   void declare (Options &options);
   Exit run ();
 
@@ -35,36 +34,6 @@ private:
   bool second_ = false;
   SecondCamera beside_;
 };
-
-CommandText
-Live::text ()
-{
-  return {.name = "live",
-      .summary = "watch coded frames and subframes in a window",
-      .usage = "[option...]",
-      .description =
-          "Shows coded frames and subframes in a window. The frames of the "
-          "camera are on\nthe left, the subframes, at N times the frame rate, "
-          "on the right; below are what\nis known of the frame, the losses, "
-          "and the histogram of its exposure. Pictures\nare scaled so that the "
-          "window fits the screen. Ends after --frames, with Ctrl-C\nor when "
-          "the window is closed.\n"
-          "Without another scene or a camera, the simulated bench looks at a "
-          "liquid that is\npoured again every 1.5 s.\n\n" +
-          WindowOptions::keys_of ("live"),
-      .notes = "Exit status: 1 if what was to be kept could not be written, or "
-               "--keep-on could\nsee no event; 3 if frames were lost in the "
-               "file of --record.\n",
-      .examples =
-          "  The simulated bench, whose camera looks at a candle:\n"
-          "    codedexposure live --scene candle --frames 100\n"
-          "  The same with the default scene, a liquid, which is also "
-          "recorded:\n"
-          "    codedexposure live --frames 100 --record watched.mkv\n"
-          "  A camera, which a DMD on the USB triggers:\n"
-          "    codedexposure live --camera \"Allied Vision-0123456789\" "
-          "--device usb: \\\n      --size 768x576\n"};
-}
 
 void
 Live::declare (Options &options)
@@ -185,7 +154,32 @@ Live::run ()
 Command
 live_command ()
 {
-  return make_command<Live> ();
+  return make_command<Live> ({.name = "live",
+      .summary = "watch coded frames and subframes in a window",
+      .usage = "[option...]",
+      .description = R"(
+Shows coded frames and subframes in a window. The frames of the camera are on
+the left, the subframes, at N times the frame rate, on the right; below are what
+is known of the frame, the losses, and the histogram of its exposure. Pictures
+are scaled so that the window fits the screen. Ends after --frames, with Ctrl-C
+or when the window is closed.
+Without another scene or a camera, the simulated bench looks at a liquid that is
+poured again every 1.5 s.
+
+)" + WindowOptions::keys_of ("live"),
+      .notes = R"(
+Exit status: 1 if what was to be kept could not be written, or --keep-on could
+see no event; 3 if frames were lost in the file of --record.
+
+Examples:
+  The simulated bench, whose camera looks at a candle:
+    codedexposure live --scene candle --frames 100
+  The same with the default scene, a liquid, which is also recorded:
+    codedexposure live --frames 100 --record watched.mkv
+  A camera, which a DMD on the USB triggers:
+    codedexposure live --camera "Allied Vision-0123456789" --device usb: \
+      --size 768x576
+)"});
 }
 
 } // namespace codedexposure::app

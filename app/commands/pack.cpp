@@ -55,7 +55,6 @@ log_frames (GstElement *element, std::vector<std::string> &lines)
 class Pack
 {
 public:
-  static CommandText text ();
   void declare (Options &options);
   Exit run ();
 
@@ -87,34 +86,6 @@ private:
   std::optional<Signals> signals_; // from the first pass to the last
   int lock_ = -1;                  // open and locked until the program ends
 };
-
-CommandText
-Pack::text ()
-{
-  return {.name = "pack",
-      .summary = "turn a raw recording into FFV1, checked frame by frame",
-      .usage = "[option...] RECORDING.mkv",
-      .description =
-          "Turns a raw recording into lossless FFV1, which takes about half of "
-          "the space.\nReads the result back and compares every frame with "
-          "that of the raw recording\nand with the hash in its track: pixels, "
-          "time and flags. Only then replaces the\nrecording. A recording that "
-          "is FFV1 stays as it is, and so does one that is cut\noff or "
-          "damaged, because another program may read more of it; --output "
-          "and\n--force pack what can be read, and damaged frames stay "
-          "damaged.\n",
-      .notes =
-          "Exit status: 0 packed, or FFV1 already; 1 failed, and the "
-          "recording is as it\nwas; 2 wrong usage; 3 the recording is cut "
-          "off or damaged; 130 stopped, and the\nrecording is as it was.\n",
-      .examples = "  A recording, in its place:\n"
-                  "    codedexposure pack fast.mkv\n"
-                  "  A copy on another disk:\n"
-                  "    codedexposure pack fast.mkv --output /archive/fast.mkv\n"
-                  "  All recordings of a folder, two at a time:\n"
-                  "    parallel -j2 codedexposure pack --threads 1 ::: "
-                  "recordings/*.mkv\n"};
-}
 
 void
 Pack::declare (Options &options)
@@ -298,7 +269,30 @@ Pack::run ()
 Command
 pack_command ()
 {
-  return make_command<Pack> ();
+  return make_command<Pack> ({.name = "pack",
+      .summary = "turn a raw recording into FFV1, checked frame by frame",
+      .usage = "[option...] RECORDING.mkv",
+      .description = R"(
+Turns a raw recording into lossless FFV1, which takes about half of the space.
+Reads the result back and compares every frame with that of the raw recording
+and with the hash in its track: pixels, time and flags. Only then replaces the
+recording. A recording that is FFV1 stays as it is, and so does one that is cut
+off or damaged, because another program may read more of it; --output and
+--force pack what can be read, and damaged frames stay damaged.
+)",
+      .notes = R"(
+Exit status: 0 packed, or FFV1 already; 1 failed, and the recording is as it
+was; 2 wrong usage; 3 the recording is cut off or damaged; 130 stopped, and the
+recording is as it was.
+
+Examples:
+  A recording, in its place:
+    codedexposure pack fast.mkv
+  A copy on another disk:
+    codedexposure pack fast.mkv --output /archive/fast.mkv
+  All recordings of a folder, two at a time:
+    parallel -j2 codedexposure pack --threads 1 ::: recordings/*.mkv
+)"});
 }
 
 } // namespace codedexposure::app

@@ -20,7 +20,6 @@ namespace
 class Play
 {
 public:
-  static CommandText text ();
   void declare (Options &options);
   Exit run ();
 
@@ -34,31 +33,6 @@ private:
   RunOptions run_;
   std::optional<Text> export_;
 };
-
-CommandText
-Play::text ()
-{
-  return {.name = "play",
-      .summary = "watch a recording in a window, and move in it",
-      .usage = "[option...] RECORDING.mkv",
-      .description =
-          "Shows the coded frames and the subframes of a recording beside each "
-          "other, as\nlive does, without decoding it first: at any speed, "
-          "subframe by subframe, or a\nmarked stretch again and again, which "
-          "can be exported. After the last frame it\nwaits for a key.\n\n" +
-          Player::keys_of (),
-      .notes = "What is exported has the pixels that decode gives. The window "
-               "skips subframes if\nthe screen or the fusion is too slow for "
-               "the speed; pauses and steps skip none.\n",
-      .examples =
-          "  Subframes:\n"
-          "    codedexposure play coded.mkv\n"
-          "  Full-size frames in their place; stretches become folders of "
-          "PNG files:\n"
-          "    codedexposure play coded.mkv --fuse best --export png\n"
-          "  In a window of another video sink:\n"
-          "    codedexposure play coded.mkv --sink ximagesink\n"};
-}
 
 void
 Play::declare (Options &options)
@@ -135,7 +109,28 @@ Play::run ()
 Command
 play_command ()
 {
-  return make_command<Play> ();
+  return make_command<Play> ({.name = "play",
+      .summary = "watch a recording in a window, and move in it",
+      .usage = "[option...] RECORDING.mkv",
+      .description = R"(
+Shows the coded frames and the subframes of a recording beside each other, as
+live does, without decoding it first: at any speed, subframe by subframe, or a
+marked stretch again and again, which can be exported. After the last frame it
+waits for a key.
+
+)" + Player::keys_of (),
+      .notes = R"(
+What is exported has the pixels that decode gives. The window skips subframes if
+the screen or the fusion is too slow for the speed; pauses and steps skip none.
+
+Examples:
+  Subframes:
+    codedexposure play coded.mkv
+  Full-size frames in their place; stretches become folders of PNG files:
+    codedexposure play coded.mkv --fuse best --export png
+  In a window of another video sink:
+    codedexposure play coded.mkv --sink ximagesink
+)"});
 }
 
 } // namespace codedexposure::app

@@ -42,10 +42,10 @@ profile_command ()
       {{{.name = "show",
             .summary = "check a bench profile and show what it says",
             .usage = "[option...] [FILE.json]",
-            .description =
-                "Checks the bench profile FILE.json [bench.json], as "
-                "\"codedexposure doctor\"\nwrites it, and shows what "
-                "it says; with --json, its JSON form.\n"},
+            .description = R"(
+Checks the bench profile FILE.json [bench.json], as "codedexposure doctor"
+writes it, and shows what it says; with --json, its JSON form.
+)"},
           [] (Options &options, Arguments &a) {
             options.word ("FILE.json", a.path, true);
             a.declare (options);

@@ -20,7 +20,6 @@ namespace
 class Receive
 {
 public:
-  static CommandText text ();
   void declare (Options &options);
   Exit run ();
 
@@ -40,31 +39,6 @@ private:
 };
 
 constexpr double kWait = 10; // s
-
-CommandText
-Receive::text ()
-{
-  return {.name = "receive",
-      .summary = "receive coded frames, to watch or to keep them",
-      .usage = "[option...]",
-      .description =
-          "Receives the coded frames of \"codedexposure send\" and splits "
-          "them. Shows them in\na window, or writes files. May be started "
-          "before or after the sender. Ends with\nthe stream, with Ctrl-C or "
-          "when the window is closed.\n\n" +
-          WindowOptions::keys_of ("receive"),
-      .notes = "Exit status: 3 if the sender ended in the middle, or frames "
-               "were damaged; 4 if\nnobody listens at that address; 130 "
-               "stopped before the first frame.\n",
-      .examples =
-          "  Subframes of a sender on this machine, as a video:\n"
-          "    codedexposure receive --output received.mp4\n"
-          "  Its coded frames, through another port; they can be decoded "
-          "later:\n"
-          "    codedexposure receive --port 5001 --coded received.mkv\n"
-          "  A window with the subframes of the machine that is called bench:\n"
-          "    codedexposure receive --host bench\n"};
-}
 
 void
 Receive::declare (Options &options)
@@ -174,7 +148,27 @@ Receive::run ()
 Command
 receive_command ()
 {
-  return make_command<Receive> ();
+  return make_command<Receive> ({.name = "receive",
+      .summary = "receive coded frames, to watch or to keep them",
+      .usage = "[option...]",
+      .description = R"(
+Receives the coded frames of "codedexposure send" and splits them. Shows them in
+a window, or writes files. May be started before or after the sender. Ends with
+the stream, with Ctrl-C or when the window is closed.
+
+)" + WindowOptions::keys_of ("receive"),
+      .notes = R"(
+Exit status: 3 if the sender ended in the middle, or frames were damaged; 4 if
+nobody listens at that address; 130 stopped before the first frame.
+
+Examples:
+  Subframes of a sender on this machine, as a video:
+    codedexposure receive --output received.mp4
+  Its coded frames, through another port; they can be decoded later:
+    codedexposure receive --port 5001 --coded received.mkv
+  A window with the subframes of the machine that is called bench:
+    codedexposure receive --host bench
+)"});
 }
 
 } // namespace codedexposure::app

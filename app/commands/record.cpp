@@ -16,36 +16,6 @@ namespace
 class Record
 {
 public:
-  static CommandText text ()
-  {
-    return {.name = "record",
-        .summary = "record the coded frames of a camera",
-        .usage = "[option...] --output FILE.mkv",
-        .description =
-            "Records coded frames of a camera or of the simulated bench. "
-            "Writes them without\nloss in Matroska with the schedule, and "
-            "FILE.jsonl with one line for each frame\n(number, time, "
-            "synchronisation, losses). Ends after --frames, at the end of "
-            "the\nscene or with Ctrl-C. \"codedexposure decode\" decodes the "
-            "recording later, with\nany method; \"codedexposure pack\" turns a "
-            "raw one into FFV1.\n",
-        .notes =
-            "Exit status: 0 recorded, 1 failed, 2 wrong usage, 3 recorded, "
-            "but frames were\nlost, 130 stopped before the first frame.\n",
-        .examples =
-            "  The simulated bench, for 2 s:\n"
-            "    codedexposure record --frames 50 --output bench.mkv\n"
-            "  12 bits and the code of the paper, as fast as possible:\n"
-            "    codedexposure record --fast --bits 12 \\\n"
-            "      --schedule staircase:2x2 --frames 50 --output "
-            "staircase.mkv\n"
-            "  A camera, which a DMD on the USB triggers, with the codec for "
-            "which this\n  machine is fast enough:\n"
-            "    codedexposure record --camera \"Allied Vision-0123456789\" "
-            "\\\n      --device usb: --size 768x576 --codec auto "
-            "--output camera.mkv\n"};
-  }
-
   void declare (Options &options)
   {
     options.heading ("");
@@ -147,7 +117,31 @@ private:
 Command
 record_command ()
 {
-  return make_command<Record> ();
+  return make_command<Record> ({.name = "record",
+      .summary = "record the coded frames of a camera",
+      .usage = "[option...] --output FILE.mkv",
+      .description = R"(
+Records coded frames of a camera or of the simulated bench. Writes them without
+loss in Matroska with the schedule, and FILE.jsonl with one line for each frame
+(number, time, synchronisation, losses). Ends after --frames, at the end of the
+scene or with Ctrl-C. "codedexposure decode" decodes the recording later, with
+any method; "codedexposure pack" turns a raw one into FFV1.
+)",
+      .notes = R"(
+Exit status: 0 recorded, 1 failed, 2 wrong usage, 3 recorded, but frames were
+lost, 130 stopped before the first frame.
+
+Examples:
+  The simulated bench, for 2 s:
+    codedexposure record --frames 50 --output bench.mkv
+  12 bits and the code of the paper, as fast as possible:
+    codedexposure record --fast --bits 12 \
+      --schedule staircase:2x2 --frames 50 --output staircase.mkv
+  A camera, which a DMD on the USB triggers, with the codec for which this
+  machine is fast enough:
+    codedexposure record --camera "Allied Vision-0123456789" \
+      --device usb: --size 768x576 --codec auto --output camera.mkv
+)"});
 }
 
 } // namespace codedexposure::app

@@ -41,7 +41,6 @@ line_rule ()
 class Report
 {
 public:
-  static CommandText text ();
   void declare (Options &options);
   Exit run ();
 
@@ -60,37 +59,6 @@ private:
   RunOptions run_;
   bool damaged_ = false;
 };
-
-CommandText
-Report::text ()
-{
-  return {.name = "report",
-      .summary = "write a page with pictures and figures of a recording",
-      .usage = "[option...] RECORDING.mkv --output FOLDER",
-      .description =
-          "Writes a page with measurements of a recording. FOLDER/index.html "
-          "contains all\nits pictures: one coded frame with its subframes, "
-          "also in slow motion, the\nintensity over the subframes, their "
-          "profiles along a line, and the entropy of\nthe coded frame and of "
-          "each subframe. The contrast of a dark scene is stretched,\nas the "
-          "page says. If the schedule has regions, the figures are those of "
-          "the\nbackground, and the page also shows the subframes of every "
-          "part and the fused\nframe. The folder also has the pictures (PNG, "
-          "SVG) and the figures (CSV).\n",
-      .notes = "Exit status: 0 written, 1 failed, 2 wrong usage, 3 written, "
-               "but the recording is\ncut off or damaged, 4 no coded frame at "
-               "that time, 130 stopped: no page was\nwritten.\n",
-      .examples =
-          "  The frame in which most happens, and a profile along its middle "
-          "row:\n"
-          "    codedexposure report coded.mkv --output report\n"
-          "  The frame at 1 s, and a profile along a column:\n"
-          "    codedexposure report coded.mkv --at 1 --line column:30% "
-          "--output at-1-s\n"
-          "  A profile along an oblique line:\n"
-          "    codedexposure report coded.mkv --line 10%/20%/90%/80% "
-          "--output oblique\n"};
-}
 
 void
 Report::declare (Options &options)
@@ -261,7 +229,31 @@ Report::run ()
 Command
 report_command ()
 {
-  return make_command<Report> ();
+  return make_command<Report> ({.name = "report",
+      .summary = "write a page with pictures and figures of a recording",
+      .usage = "[option...] RECORDING.mkv --output FOLDER",
+      .description = R"(
+Writes a page with measurements of a recording. FOLDER/index.html contains all
+its pictures: one coded frame with its subframes, also in slow motion, the
+intensity over the subframes, their profiles along a line, and the entropy of
+the coded frame and of each subframe. The contrast of a dark scene is stretched,
+as the page says. If the schedule has regions, the figures are those of the
+background, and the page also shows the subframes of every part and the fused
+frame. The folder also has the pictures (PNG, SVG) and the figures (CSV).
+)",
+      .notes = R"(
+Exit status: 0 written, 1 failed, 2 wrong usage, 3 written, but the recording is
+cut off or damaged, 4 no coded frame at that time, 130 stopped: no page was
+written.
+
+Examples:
+  The frame in which most happens, and a profile along its middle row:
+    codedexposure report coded.mkv --output report
+  The frame at 1 s, and a profile along a column:
+    codedexposure report coded.mkv --at 1 --line column:30% --output at-1-s
+  A profile along an oblique line:
+    codedexposure report coded.mkv --line 10%/20%/90%/80% --output oblique
+)"});
 }
 
 } // namespace codedexposure::app

@@ -204,14 +204,18 @@ declare_pictures (Options &options, Arguments &arguments)
 Command
 schedule_command ()
 {
-  const Below<Arguments> shows{
-      {.name = "show",
-          .summary = "show what a schedule means",
-          .usage = "[option...] [SCHEDULE]",
-          .description = "Shows what a schedule means; with --json, prints its "
-                         "JSON form, which can be\nedited.\n",
-          .examples = "  A schedule to edit:\n"
-                      "    codedexposure schedule show --json staircase:2x2\n"},
+  const Below<Arguments> shows{{.name = "show",
+                                   .summary = "show what a schedule means",
+                                   .usage = "[option...] [SCHEDULE]",
+                                   .description = R"(
+Shows what a schedule means; with --json, prints its JSON form, which can be
+edited.
+)",
+                                   .notes = R"(
+Examples:
+  A schedule to edit:
+    codedexposure schedule show --json staircase:2x2
+)"},
       [] (Options &options, Arguments &a) {
         options.word ("SCHEDULE", a.schedule, true);
         a.declare (options);
@@ -221,11 +225,15 @@ schedule_command ()
       {.name = "check",
           .summary = "check whether it fits a DMD and a frame rate",
           .usage = "[option...] [SCHEDULE]",
-          .description = "Checks whether a board can show a schedule at a "
-                         "frame rate. Exit status 4: it\ncannot.\n",
-          .examples = "  256 slots at 25 frames/s:\n"
-                      "    codedexposure schedule check sequential:16x16 "
-                      "--dmd dlp6500 --rate 25\n"},
+          .description = R"(
+Checks whether a board can show a schedule at a frame rate. Exit status 4: it
+cannot.
+)",
+          .notes = R"(
+Examples:
+  256 slots at 25 frames/s:
+    codedexposure schedule check sequential:16x16 --dmd dlp6500 --rate 25
+)"},
       [] (Options &options, Arguments &a) {
         options.word ("SCHEDULE", a.schedule, true);
         a.declare_board (options);
@@ -237,17 +245,18 @@ schedule_command ()
       {.name = "render",
           .summary = "write the masks as bitmap files",
           .usage = "[option...] [SCHEDULE]",
-          .description =
-              "Writes the masks of a schedule as files PREFIX0.bmp, "
-              "PREFIX1.bmp ... For a\nViALUX board (alp:WIDTHxHEIGHT), "
-              "writes PREFIX.bin, its bit planes, and\nPREFIX.py, a program "
-              "for its Python binding that shows them.\n",
-          .examples = "  The four masks of the default:\n"
-                      "    codedexposure schedule render sequential:2x2 "
-                      "--output mask\n"
-                      "  For a ViALUX board of 1024x768 mirrors:\n"
-                      "    codedexposure schedule render sequential:2x2 "
-                      "--dmd alp:1024x768\n"},
+          .description = R"(
+Writes the masks of a schedule as files PREFIX0.bmp, PREFIX1.bmp ... For a
+ViALUX board (alp:WIDTHxHEIGHT), writes PREFIX.bin, its bit planes, and
+PREFIX.py, a program for its Python binding that shows them.
+)",
+          .notes = R"(
+Examples:
+  The four masks of the default:
+    codedexposure schedule render sequential:2x2 --output mask
+  For a ViALUX board of 1024x768 mirrors:
+    codedexposure schedule render sequential:2x2 --dmd alp:1024x768
+)"},
       [] (Options &options, Arguments &a) {
         options.word ("SCHEDULE", a.schedule, true);
         a.declare_board (options);
@@ -259,9 +268,10 @@ schedule_command ()
       {.name = "schedule",
           .summary = "show and check schedules, write their masks",
           .usage = "COMMAND [option...] [SCHEDULE]",
-          .description =
-              "SCHEDULE is CODE:TILE[,key=value...] or the path of a "
-              "JSON file\n[sequential:2x2].\n"},
+          .description = R"(
+SCHEDULE is CODE:TILE[,key=value...] or the path of a JSON file
+[sequential:2x2].
+)"},
       {shows, checks, renders});
 }
 

@@ -14,7 +14,6 @@ namespace
 class Send
 {
 public:
-  static CommandText text ();
   void declare (Options &options);
   Exit run ();
 
@@ -28,31 +27,6 @@ private:
   SecondCamera beside_;
   bool no_wait_ = false, second_ = false;
 };
-
-CommandText
-Send::text ()
-{
-  return {.name = "send",
-      .summary = "send the coded frames of a camera to other machines",
-      .usage = "[option...]",
-      .description =
-          "Sends coded frames to other machines. The stream (Matroska over "
-          "TCP) "
-          "has their\nschedule and all that is known of each frame. It goes to "
-          "any number of receivers\n(codedexposure receive) and starts with "
-          "the first.\nThe stream is neither encrypted nor authenticated: "
-          "outside this machine, use a\nprivate network or a tunnel (ssh -L "
-          "5000:localhost:5000 BENCH).\n",
-      .notes = "Exit status: 4 if nobody received the stream.\n",
-      .examples =
-          "  The simulated bench, for 2 s, to a receiver on this machine:\n"
-          "    codedexposure send --frames 50\n"
-          "  12 bits, through another port:\n"
-          "    codedexposure send --bits 12 --port 5001 --frames 50\n"
-          "  A camera, to receivers on any machine:\n"
-          "    codedexposure send --camera \"Allied Vision-0123456789\" "
-          "--device usb: \\\n      --size 768x576 --host 0.0.0.0\n"};
-}
 
 void
 Send::declare (Options &options)
@@ -116,7 +90,28 @@ Send::run ()
 Command
 send_command ()
 {
-  return make_command<Send> ();
+  return make_command<Send> ({.name = "send",
+      .summary = "send the coded frames of a camera to other machines",
+      .usage = "[option...]",
+      .description = R"(
+Sends coded frames to other machines. The stream (Matroska over TCP) has their
+schedule and all that is known of each frame. It goes to any number of receivers
+(codedexposure receive) and starts with the first.
+The stream is neither encrypted nor authenticated: outside this machine, use a
+private network or a tunnel (ssh -L 5000:localhost:5000 BENCH).
+)",
+      .notes = R"(
+Exit status: 4 if nobody received the stream.
+
+Examples:
+  The simulated bench, for 2 s, to a receiver on this machine:
+    codedexposure send --frames 50
+  12 bits, through another port:
+    codedexposure send --bits 12 --port 5001 --frames 50
+  A camera, to receivers on any machine:
+    codedexposure send --camera "Allied Vision-0123456789" --device usb: \
+      --size 768x576 --host 0.0.0.0
+)"});
 }
 
 } // namespace codedexposure::app

@@ -15,27 +15,6 @@ namespace
 class Simulate
 {
 public:
-  static CommandText text ()
-  {
-    return {.name = "simulate",
-        .summary = "record a scene through the simulated bench",
-        .usage = "[option...] --output FILE.mkv",
-        .description =
-            "Simulates the recording of a scene by a camera with a DMD. Writes "
-            "coded frames\nas lossless FFV1 in Matroska with the schedule, and "
-            "FILE.jsonl with one line for\neach frame. Needs no hardware.\n",
-        .examples =
-            "  A moving ball, for 2 s, seen by a camera with shot noise:\n"
-            "    codedexposure simulate --frames 50 --full-well 10000 \\\n"
-            "      --output coded.mkv\n"
-            "  A candle that is blown out, with 12 bits:\n"
-            "    codedexposure simulate --scene blown-out --bits 12 \\\n"
-            "      --output candle.mkv\n"
-            "  A video of your own; 8 of its frames become one coded frame:\n"
-            "    codedexposure simulate --input video.mp4 \\\n"
-            "      --schedule sequential:4x2 --output video.mkv\n"};
-  }
-
   void declare (Options &options)
   {
     options.heading ("");
@@ -73,7 +52,26 @@ private:
 Command
 simulate_command ()
 {
-  return make_command<Simulate> ();
+  return make_command<Simulate> ({.name = "simulate",
+      .summary = "record a scene through the simulated bench",
+      .usage = "[option...] --output FILE.mkv",
+      .description = R"(
+Simulates the recording of a scene by a camera with a DMD. Writes coded frames
+as lossless FFV1 in Matroska with the schedule, and FILE.jsonl with one line for
+each frame. Needs no hardware.
+)",
+      .notes = R"(
+Examples:
+  A moving ball, for 2 s, seen by a camera with shot noise:
+    codedexposure simulate --frames 50 --full-well 10000 \
+      --output coded.mkv
+  A candle that is blown out, with 12 bits:
+    codedexposure simulate --scene blown-out --bits 12 \
+      --output candle.mkv
+  A video of your own; 8 of its frames become one coded frame:
+    codedexposure simulate --input video.mp4 \
+      --schedule sequential:4x2 --output video.mkv
+)"});
 }
 
 } // namespace codedexposure::app

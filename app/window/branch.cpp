@@ -131,19 +131,18 @@ WindowOptions::add_keeper (
 std::string
 WindowOptions::keys_of (const std::string &command)
 {
-  return "Keys in the window:\n"
-         "  Space           pause at the subframe that is shown; again: live\n"
-         "  Left, Right     pause, and go one subframe back or forward\n"
-         "  L               loop the last second at 1/4 speed; again: live\n"
-         "  K               keep what has just happened: the coded frames of "
-         "the last 10 s\n                  become a recording, " +
-         command +
-         "-frameN.mkv;\n                  the signal USR1 does so, too\n"
-         "  Up, Down        change the gain of a GenICam camera by 1/20 of its "
-         "range\n"
-         "  PageUp, PageDown\n                  change its exposure time, as "
-         "far as all slots are whole\n" +
-         common_keys (command) +
+  return R"(Keys in the window:
+  Space           pause at the subframe that is shown; again: live
+  Left, Right     pause, and go one subframe back or forward
+  L               loop the last second at 1/4 speed; again: live
+  K               keep what has just happened: the coded frames of the last 10 s
+                  become a recording, )" +
+         command + R"(-frameN.mkv;
+                  the signal USR1 does so, too
+  Up, Down        change the gain of a GenICam camera by 1/20 of its range
+  PageUp, PageDown
+                  change its exposure time, as far as all slots are whole
+)" + common_keys (command) +
          "The stream does not wait for the window: recording and counting go "
          "on in a pause\nor loop, and subframes are skipped if the screen is "
          "too slow. The window keeps\nthe pictures of the last second, up to "
@@ -155,24 +154,23 @@ WindowOptions::keys_of (const std::string &command)
 std::string
 WindowOptions::common_keys (const std::string &command)
 {
-  return "  S               write what is shown to the current folder, but "
-         "replace no\n                  file: the window to " +
-         command +
-         "-frameN-slotK-TIMEs.png, and each\n                  picture with "
-         "all of its pixels and bits beside it,\n                  "
-         "...-camera.png and so on\n"
-         "  Wheel, Z, X     look closer at the pointer, and back; 0: see the "
-         "whole.\n                  The captions say the pixel at the pointer "
-         "and its value\n"
-         "  Drag            move the part that is seen; with the right button: "
-         "contrast\n                  (right, left) and brightness (up, down)\n"
-         "  +, -            show pictures twice as bright, and back\n"
-         "  C               stretch what is seen of the coded frame from black "
-         "to white;\n                  again: show all values\n"
-         "  R               mark saturated pixels in red; again: do not\n"
-         "  F               fill the screen; again, or Esc: do not\n"
-         "  H               show these keys; again: hide them\n"
-         "  Q               end, as Ctrl-C does\n";
+  return R"(  S               write what is shown to the current folder, but replace no
+                  file: the window to )" +
+         command + R"(-frameN-slotK-TIMEs.png, and each
+                  picture with all of its pixels and bits beside it,
+                  ...-camera.png and so on
+  Wheel, Z, X     look closer at the pointer, and back; 0: see the whole.
+                  The captions say the pixel at the pointer and its value
+  Drag            move the part that is seen; with the right button: contrast
+                  (right, left) and brightness (up, down)
+  +, -            show pictures twice as bright, and back
+  C               stretch what is seen of the coded frame from black to white;
+                  again: show all values
+  R               mark saturated pixels in red; again: do not
+  F               fill the screen; again, or Esc: do not
+  H               show these keys; again: hide them
+  Q               end, as Ctrl-C does
+)";
 }
 
 WindowBranch

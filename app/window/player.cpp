@@ -35,20 +35,17 @@ Player::~Player ()
 std::string
 Player::keys_of ()
 {
-  return "Keys in the window:\n"
-         "  Space           pause, and go on\n"
-         "  Left, Right     pause, and go one subframe back or forward\n"
-         "  PgUp, PgDn      go one second back or forward\n"
-         "  Home, End       go to the first or the last coded frame\n"
-         "  [, ]            play at half or twice the speed, from 1/64 to 16\n"
-         "  A, B            mark the coded frame that is shown as the first, "
-         "or "
-         "the last,\n                  of a stretch; Backspace: no marks\n"
-         "  L               play the stretch, or all, again and again, or "
-         "once\n"
-         "  E               export the stretch, as decode does, to the current "
-         "folder\n" +
-         WindowOptions::common_keys ("play");
+  return R"(Keys in the window:
+  Space           pause, and go on
+  Left, Right     pause, and go one subframe back or forward
+  PgUp, PgDn      go one second back or forward
+  Home, End       go to the first or the last coded frame
+  [, ]            play at half or twice the speed, from 1/64 to 16
+  A, B            mark the coded frame that is shown as the first, or the last,
+                  of a stretch; Backspace: no marks
+  L               play the stretch, or all, again and again, or once
+  E               export the stretch, as decode does, to the current folder
+)" + WindowOptions::common_keys ("play");
 }
 
 const char *

@@ -26,8 +26,6 @@ using namespace gst;
 namespace
 {
 
-using SamplePtr = std::unique_ptr<GstSample, MiniObjectUnref>;
-
 /** The pictures of one excerpt, in their order. */
 class Part
 {
@@ -58,9 +56,8 @@ public:
   /** Why there are no more; none: that was the end. */
   const std::optional<std::string> &failure ()
   {
-    const ObjectPtr<GstBus> bus (gst_element_get_bus (job_.graph.pipeline ()));
-    const std::unique_ptr<GstMessage, MiniObjectUnref> message (
-        gst_bus_pop_filtered (bus.get (), GST_MESSAGE_ERROR));
+    const MessagePtr message =
+        next_message (job_.graph.pipeline (), GST_MESSAGE_ERROR);
     if (message && !failure_)
       failure_ = Told (message.get ()).error->message;
     return failure_;

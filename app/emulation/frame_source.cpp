@@ -63,12 +63,8 @@ FrameSource::take (ImageView<std::uint16_t> picture)
 std::string
 FrameSource::why_ended () const
 {
-  const ObjectPtr<GstBus> bus (gst_element_get_bus (pipeline_));
-  const std::unique_ptr<GstMessage, MiniObjectUnref> message (
-      gst_bus_pop_filtered (bus.get (), GST_MESSAGE_ERROR));
-  if (!message)
-    return "the scene has ended";
-  return Told (message.get ()).error->message;
+  const MessagePtr message = next_message (pipeline_, GST_MESSAGE_ERROR);
+  return message ? Told (message.get ()).error->message : "the scene has ended";
 }
 
 } // namespace codedexposure::app

@@ -41,7 +41,7 @@ private:
 
   GstElement *pipeline_ = nullptr;
   GstAppSink *sink_ = nullptr;
-  std::unique_ptr<GstSample, gst::MiniObjectUnref> sample_;
+  gst::SamplePtr sample_;
   GstVideoInfo info_ = {};
   bool loop_ = false;
   std::atomic<bool> ended_ = false;

@@ -146,7 +146,7 @@ offers (const GigeCameraOptions &options, MonoFormat format)
 Result<std::string>
 describe (const GigeCameraOptions &options)
 {
-  const std::unique_ptr<ArvFakeCamera, Unref> model (
+  const std::unique_ptr<ArvFakeCamera, FreeWith<g_object_unref>> model (
       arv_fake_camera_new ("model"));
   size_t size = 0;
   const char *text = arv_fake_camera_get_genicam_xml (model.get (), &size);

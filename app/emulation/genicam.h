@@ -9,14 +9,11 @@
 
 #include <arv.h>
 
+#include "base/free_with.h"
 #include "emulation/gige_camera.h"
 
 namespace codedexposure::genicam
 {
-
-struct Unref {
-  void operator() (gpointer object) const { g_object_unref (object); }
-};
 
 /** Register in which a client enables the trigger. */
 constexpr guint32 kTriggerMode = 0x400;

@@ -96,7 +96,7 @@ struct SimulatedCamera final : public GigeCamera {
 
   ArvFakeCamera *camera = nullptr; // of the server
   /* Last: its thread uses all of the above. */
-  std::unique_ptr<ArvGvFakeCamera, Unref> server;
+  std::unique_ptr<ArvGvFakeCamera, FreeWith<g_object_unref>> server;
 
   guint32 get_register (guint32 address) const
   {

@@ -17,6 +17,8 @@
 #include <utility>
 #include <vector>
 
+#include "base/free_with.h"
+
 namespace codedexposure::emulated
 {
 
@@ -25,14 +27,9 @@ namespace
 
 constexpr std::uint8_t kOut = 0x01, kIn = 0x81;
 
-struct DataUnref {
-  void operator() (UMockdevIoctlData *data) const
-  {
-    umockdev_ioctl_data_unref (data);
-  }
-};
 /** A reference to memory of the program under test. */
-using Reference = std::unique_ptr<UMockdevIoctlData, DataUnref>;
+using Reference =
+    std::unique_ptr<UMockdevIoctlData, FreeWith<umockdev_ioctl_data_unref>>;
 
 /** The memory behind the pointer at @p offset of @p data; null: the program was
  * killed meanwhile. */
@@ -49,10 +46,8 @@ as (const Reference &memory)
   return reinterpret_cast<T *> (memory->data);
 }
 
-struct Unref {
-  void operator() (gpointer object) const { g_object_unref (object); }
-};
-using ClientRef = std::unique_ptr<UMockdevIoctlClient, Unref>;
+using ClientRef =
+    std::unique_ptr<UMockdevIoctlClient, FreeWith<g_object_unref>>;
 
 ClientRef
 ref (UMockdevIoctlClient *client)

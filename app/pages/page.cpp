@@ -112,12 +112,9 @@ png_of (const Image<std::uint8_t> &picture)
         &picture.at (0, y), gsize (picture.width ()));
   const CapsPtr caps (gst_video_info_to_caps (&info)),
       wanted (gst_caps_new_empty_simple ("image/png"));
-  const auto sample_of = [] (GstSample *sample) {
-    return std::unique_ptr<GstSample, MiniObjectUnref> (sample);
-  };
-  const auto raw =
-      sample_of (gst_sample_new (buffer.get (), caps.get (), nullptr, nullptr));
-  const auto png = sample_of (gst_video_convert_sample (
+  const SamplePtr raw (
+      gst_sample_new (buffer.get (), caps.get (), nullptr, nullptr));
+  const SamplePtr png (gst_video_convert_sample (
       raw.get (), wanted.get (), GST_CLOCK_TIME_NONE, nullptr));
   if (!png)
     return {};

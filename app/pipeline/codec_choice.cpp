@@ -45,11 +45,10 @@ ffv1_speed (const SourcePlan &plan)
       .to ("fakesink", {{"sync", false}});
   const auto begin = Clock::now ();
   gst_element_set_state (graph.pipeline (), GST_STATE_PLAYING);
-  const ObjectPtr<GstBus> bus (gst_element_get_bus (graph.pipeline ()));
-  GstMessage *message = gst_bus_timed_pop_filtered (bus.get (), kPatience,
-      GstMessageType (GST_MESSAGE_EOS | GST_MESSAGE_ERROR));
-  const bool ended = message && GST_MESSAGE_TYPE (message) == GST_MESSAGE_EOS;
-  gst_clear_message (&message);
+  const MessagePtr message = next_message (
+      graph.pipeline (), GST_MESSAGE_EOS | GST_MESSAGE_ERROR, kPatience);
+  const bool ended =
+      message && GST_MESSAGE_TYPE (message.get ()) == GST_MESSAGE_EOS;
   return ended ? frames / seconds_since (begin) : 0;
 }
 

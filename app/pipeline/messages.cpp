@@ -280,6 +280,14 @@ is_silence (std::string_view kind, const Told &told)
          !is_unfit (told);
 }
 
+MessagePtr
+next_message (GstElement *pipeline, int types, GstClockTime patience)
+{
+  const ObjectPtr<GstBus> bus (gst_element_get_bus (pipeline));
+  return MessagePtr (gst_bus_timed_pop_filtered (
+      bus.get (), patience, GstMessageType (types)));
+}
+
 std::string
 told (GstMessage *message)
 {

@@ -39,10 +39,14 @@ std::string package_of (std::string_view element);
 struct Told {
   explicit Told (GstMessage *message);
 
-  std::unique_ptr<GError, decltype (&g_error_free)> error{
-      nullptr, g_error_free};
+  std::unique_ptr<GError, FreeWith<g_error_free>> error;
   gst::CharPtr debug;
 };
+/** The next message that @p pipeline posts of these GstMessageTypes, within @p
+ * patience; null: there is none. */
+gst::MessagePtr next_message (
+    GstElement *pipeline, int types, GstClockTime patience = 0);
+
 /** Source and text of such a message with its details, without the position in
  * the code; properties are named as the options of commands. Of an INFO
  * message, the details alone, as gst-launch-1.0 prints them. */

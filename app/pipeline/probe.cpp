@@ -15,18 +15,6 @@ namespace codedexposure::app
 
 using namespace gst;
 
-namespace
-{
-
-struct ListFree {
-  void operator() (GList *list) const
-  {
-    gst_discoverer_stream_info_list_free (list);
-  }
-};
-
-} // namespace
-
 VideoFacts
 probe_video (const std::string &path)
 {
@@ -41,8 +29,9 @@ probe_video (const std::string &path)
       discoverer && uri
           ? gst_discoverer_discover_uri (discoverer.get (), uri.get (), nullptr)
           : nullptr);
-  const std::unique_ptr<GList, ListFree> streams (
-      info ? gst_discoverer_info_get_video_streams (info.get ()) : nullptr);
+  const std::unique_ptr<GList, FreeWith<gst_discoverer_stream_info_list_free>>
+      streams (
+          info ? gst_discoverer_info_get_video_streams (info.get ()) : nullptr);
   if (!streams)
     fail (path + " is no video that the installed decoders can read");
   auto *video = GST_DISCOVERER_VIDEO_INFO (streams->data);

@@ -42,12 +42,10 @@ FramePipeline::set_state (GstState state)
 std::optional<Error>
 FramePipeline::take_error ()
 {
-  const ObjectPtr<GstBus> bus (gst_element_get_bus (pipeline ()));
-  while (GstMessage *message =
-             gst_bus_pop_filtered (bus.get (), GST_MESSAGE_ERROR)) {
-    const std::unique_ptr<GstMessage, MiniObjectUnref> owner (message);
-    const Told said (message);
-    const std::string kind = factory_of (GST_MESSAGE_SRC (message));
+  while (const MessagePtr message =
+             next_message (pipeline (), GST_MESSAGE_ERROR)) {
+    const Told said (message.get ());
+    const std::string kind = factory_of (GST_MESSAGE_SRC (message.get ()));
     if (is_silence (kind, said))
       continue;
     const std::string remedy = remedy_for (kind, said);

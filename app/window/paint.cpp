@@ -12,10 +12,7 @@ namespace codedexposure::app
 namespace
 {
 
-struct CairoDestroy {
-  void operator() (cairo_t *cairo) const { cairo_destroy (cairo); }
-};
-using Cairo = std::unique_ptr<cairo_t, CairoDestroy>;
+using Cairo = std::unique_ptr<cairo_t, FreeWith<cairo_destroy>>;
 
 struct Colour {
   double red, green, blue;

@@ -9,18 +9,14 @@
 
 #include <cairo.h>
 
+#include "base/free_with.h"
 #include "window/layout.h"
 
 namespace codedexposure::app
 {
 
-struct SurfaceDestroy {
-  void operator() (cairo_surface_t *surface) const
-  {
-    cairo_surface_destroy (surface);
-  }
-};
-using Surface = std::unique_ptr<cairo_surface_t, SurfaceDestroy>;
+using Surface =
+    std::unique_ptr<cairo_surface_t, FreeWith<cairo_surface_destroy>>;
 
 /** How a coded frame is exposed. */
 struct Exposure {

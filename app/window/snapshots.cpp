@@ -19,7 +19,6 @@ namespace
 {
 
 using namespace gst;
-using Sample = std::unique_ptr<GstSample, MiniObjectUnref>;
 
 Error
 unwritten (const std::string &name, const std::string &why)
@@ -40,11 +39,11 @@ save_window (const Snapshot &snapshot, Part &part)
 }
 
 /* Null: @error is set. */
-Sample
-converted (const Sample &sample, const CapsPtr &caps, GError **error)
+SamplePtr
+converted (const SamplePtr &sample, const CapsPtr &caps, GError **error)
 {
   constexpr GstClockTime kMost = 10 * GST_SECOND;
-  return Sample (
+  return SamplePtr (
       gst_video_convert_sample (sample.get (), caps.get (), kMost, error));
 }
 
@@ -58,10 +57,10 @@ save_picture (const FullPicture &picture, Part &part)
                                                 ? "video/x-raw,format=GRAY16_BE"
                                                 : "video/x-raw,format=GRAY8"));
   const CapsPtr png (gst_caps_new_empty_simple ("image/png"));
-  const Sample sample (
+  const SamplePtr sample (
       gst_sample_new (picture.frame.get (), from.get (), nullptr, nullptr));
   GError *error = nullptr;
-  Sample coded = converted (sample, grey, &error);
+  SamplePtr coded = converted (sample, grey, &error);
   if (coded)
     coded = converted (coded, png, &error);
   if (!coded) {

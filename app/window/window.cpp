@@ -116,14 +116,10 @@ void
 Window::finish ()
 {
   /* An element that ends says what it has kept. */
-  const ObjectPtr<GstBus> bus (gst_element_get_bus (calls_.pipeline));
-  const auto next = [&bus] {
-    return std::unique_ptr<GstMessage, MiniObjectUnref> (
-        gst_bus_pop_filtered (bus.get (),
-            GstMessageType (GST_MESSAGE_ELEMENT | GST_MESSAGE_WARNING)));
-  };
-  for (auto message = next (); setup_.keeper && message; message = next ())
-    take_kept (message.get ());
+  if (setup_.keeper)
+    while (const MessagePtr message = next_message (
+               calls_.pipeline, GST_MESSAGE_ELEMENT | GST_MESSAGE_WARNING))
+      take_kept (message.get ());
   snapshots_.write ();
   /* No picture is drawn any more. */
   if (snapshot_wanted_)

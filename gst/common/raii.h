@@ -11,6 +11,7 @@
 #include <gst/gst.h>
 #include <gst/video/video.h>
 
+#include "base/free_with.h"
 #include "base/image.h"
 #include "base/result.h"
 
@@ -26,12 +27,10 @@ struct MiniObjectUnref {
 using BufferPtr = std::unique_ptr<GstBuffer, MiniObjectUnref>;
 using CapsPtr = std::unique_ptr<GstCaps, MiniObjectUnref>;
 using EventPtr = std::unique_ptr<GstEvent, MiniObjectUnref>;
+using MessagePtr = std::unique_ptr<GstMessage, MiniObjectUnref>;
 using QueryPtr = std::unique_ptr<GstQuery, MiniObjectUnref>;
+using SamplePtr = std::unique_ptr<GstSample, MiniObjectUnref>;
 
-template <auto Free>
-struct FreeWith {
-  void operator() (auto *object) const { Free (object); }
-};
 using ObjectUnref = FreeWith<gst_object_unref>;
 template <typename T>
 using ObjectPtr = std::unique_ptr<T, ObjectUnref>;

@@ -7,21 +7,16 @@
 
 #include <cairo.h>
 
+#include "base/free_with.h"
 #include "base/image.h"
 #include "mapping/mapping.h"
 
 namespace codedexposure
 {
 
-struct CairoDestroy {
-  void operator() (cairo_t *cairo) const { cairo_destroy (cairo); }
-  void operator() (cairo_surface_t *surface) const
-  {
-    cairo_surface_destroy (surface);
-  }
-};
-using CairoPtr = std::unique_ptr<cairo_t, CairoDestroy>;
-using SurfacePtr = std::unique_ptr<cairo_surface_t, CairoDestroy>;
+using CairoPtr = std::unique_ptr<cairo_t, FreeWith<cairo_destroy>>;
+using SurfacePtr =
+    std::unique_ptr<cairo_surface_t, FreeWith<cairo_surface_destroy>>;
 
 /** Draws in a grey on what is there. The image is complete when the canvas is
  * gone. */

@@ -142,10 +142,6 @@ ome_xml (const StackFormat &format, const std::vector<StackRow> &rows,
   return text + "</StructuredAnnotations>\n</OME>\n";
 }
 
-struct TiffClose {
-  void operator() (TIFF *tiff) const { TIFFClose (tiff); }
-};
-
 class OmeTiff : public StackFile
 {
 public:
@@ -195,7 +191,7 @@ private:
   std::string error_;
   std::vector<StackRow> rows_;
   std::vector<StackOrigin> origins_;
-  std::unique_ptr<TIFF, TiffClose> tiff_;
+  std::unique_ptr<TIFF, FreeWith<TIFFClose>> tiff_;
 };
 
 /* ImageJ reads neither a predictor nor LZW of every kind. */

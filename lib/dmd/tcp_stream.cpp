@@ -14,6 +14,7 @@
 #include <cstring>
 #include <utility>
 
+#include "base/free_with.h"
 #include "base/text.h"
 #include "base/try.h"
 
@@ -27,8 +28,7 @@ using namespace std::chrono_literals;
 
 constexpr auto kPatience = 50ms;
 
-using Addresses = std::unique_ptr<addrinfo,
-    std::integral_constant<decltype (&freeaddrinfo), freeaddrinfo>>;
+using Addresses = std::unique_ptr<addrinfo, FreeWith<freeaddrinfo>>;
 
 /** Names would be looked up by servers that the network of a board does not
  * have, and that cannot be told how long to take. */

@@ -8,6 +8,7 @@
 
 #include <libusb.h>
 
+#include "base/free_with.h"
 #include "base/text.h"
 #include "base/try.h"
 #include "dmd/drivers.h"
@@ -23,8 +24,7 @@ constexpr int kMaxPorts = 7;
 
 using Context = std::shared_ptr<libusb_context>;
 using Device = std::shared_ptr<libusb_device>;
-using Handle = std::unique_ptr<libusb_device_handle,
-    std::integral_constant<decltype (&libusb_close), libusb_close>>;
+using Handle = std::unique_ptr<libusb_device_handle, FreeWith<libusb_close>>;
 
 Error
 usb_error (const std::string &what, int code)

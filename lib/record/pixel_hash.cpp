@@ -7,19 +7,12 @@
 
 #include <xxhash.h>
 
+#include "base/free_with.h"
+
 namespace codedexposure
 {
 
 static_assert (std::endian::native == std::endian::little);
-
-namespace
-{
-
-struct FreeState {
-  void operator() (XXH3_state_t *state) const { XXH3_freeState (state); }
-};
-
-} // namespace
 
 template <typename Pixel>
 std::uint64_t
@@ -28,7 +21,8 @@ pixel_hash (ImageView<const Pixel> pixels)
   const std::size_t row = std::size_t (pixels.width) * sizeof (Pixel);
   if (pixels.stride == std::ptrdiff_t (row))
     return XXH3_64bits (pixels.data, row * std::size_t (pixels.height));
-  const std::unique_ptr<XXH3_state_t, FreeState> state (XXH3_createState ());
+  const std::unique_ptr<XXH3_state_t, FreeWith<XXH3_freeState>> state (
+      XXH3_createState ());
   if (!state)
     throw std::bad_alloc ();
   XXH3_64bits_reset (state.get ());

@@ -3,7 +3,7 @@
 #include <arv.h>
 
 #include <cstdio>
-#include <optional>
+#include <memory>
 
 #include "base/text.h"
 #include "command.h"
@@ -24,19 +24,6 @@ struct Arguments : Printing {
 
 using CameraPtr = gst::ObjectPtr<ArvCamera>;
 
-/* What @read gives of a camera; none, if it has no such feature. */
-template <typename Read>
-auto
-known (Read read) -> std::optional<decltype (read (nullptr))>
-{
-  GError *failed = nullptr;
-  auto value = read (&failed);
-  if (!failed)
-    return value;
-  g_clear_error (&failed);
-  return std::nullopt;
-}
-
 CameraPtr
 open (const std::string &name)
 {
@@ -46,33 +33,15 @@ open (const std::string &name)
     return camera;
   const std::string why = failed ? failed->message : "it does not answer";
   g_clear_error (&failed);
-  throw Failure{Exit::no_device, Error{"cannot open the camera " + name + ": " +
-                                       why + "; " + cameras_found ()}};
-}
-
-bool
-has (ArvCamera *camera, const char *feature)
-{
-  return known ([&] (GError **failed) {
-    return arv_camera_is_feature_available (camera, feature, failed);
-  }).value_or (FALSE);
+  fail ("cannot open the camera " + name + ": " + why + "; " + cameras_found (),
+      Exit::no_device);
 }
 
 /* As the camera writes it; "": it has no such feature. */
 std::string
 text_of (ArvCamera *camera, const char *feature)
 {
-  if (!has (camera, feature))
-    return "";
-  ArvGcNode *node =
-      arv_device_get_feature (arv_camera_get_device (camera), feature);
-  if (!ARV_IS_GC_FEATURE_NODE (node))
-    return "";
-  const auto value = known ([&] (GError **failed) {
-    return arv_gc_feature_node_get_value_as_string (
-        ARV_GC_FEATURE_NODE (node), failed);
-  });
-  return value && *value ? *value : "";
+  return feature_text (arv_camera_get_device (camera), feature).value_or ("");
 }
 
 using ReadNames = const char **(*)(ArvCamera *, guint *, GError **);
@@ -81,13 +50,9 @@ std::vector<std::string>
 names_of (ArvCamera *camera, ReadNames read)
 {
   guint count = 0;
-  const auto list =
-      known ([&] (GError **failed) { return read (camera, &count, failed); });
-  if (!list || !*list)
-    return {};
-  std::vector<std::string> names (*list, *list + count);
-  g_free (*list);
-  return names;
+  const std::unique_ptr<const char *, FreeWith<g_free>> list (
+      read (camera, &count, nullptr));
+  return {list.get (), list.get () + count};
 }
 
 /* Those that coded frames can have. */
@@ -106,10 +71,7 @@ std::string
 size_of (ArvCamera *camera)
 {
   gint width = 0, height = 0;
-  known ([&] (GError **failed) {
-    arv_camera_get_sensor_size (camera, &width, &height, failed);
-    return 0;
-  });
+  arv_camera_get_sensor_size (camera, &width, &height, nullptr);
   return width > 0 ? std::to_string (width) + "x" + std::to_string (height)
                    : "not known";
 }
@@ -118,8 +80,9 @@ size_of (ArvCamera *camera)
 std::string
 trigger_of (ArvCamera *camera)
 {
-  if (!has (camera, "TriggerMode") || !has (camera, "TriggerSource"))
-    return "no";
+  for (const char *feature : {"TriggerMode", "TriggerSource"})
+    if (!arv_camera_is_feature_available (camera, feature, nullptr))
+      return "no";
   const auto sources =
       names_of (camera, arv_camera_dup_available_trigger_sources);
   std::vector<std::string> lines;
@@ -218,17 +181,16 @@ add_range (Json &entry, const char *key, ArvCamera *camera, ReadBounds bounds,
     double (*value) (ArvCamera *, GError **), const char *unit)
 {
   double least = 0.0, most = 0.0;
-  const bool bounded = bool (known ([&] (GError **failed) {
-    bounds (camera, &least, &most, failed);
-    return 0;
-  }));
-  const auto now =
-      known ([&] (GError **failed) { return value (camera, failed); });
-  if (now)
-    entry[key] = number_text (*now) + unit +
-                 (bounded ? " (" + number_text (least) + " to " +
-                                number_text (most) + ")"
-                          : "");
+  GError *unbounded = nullptr, *unknown = nullptr;
+  bounds (camera, &least, &most, &unbounded);
+  const double now = value (camera, &unknown);
+  if (!unknown)
+    entry[key] = number_text (now) + unit +
+                 (unbounded ? ""
+                            : " (" + number_text (least) + " to " +
+                                  number_text (most) + ")");
+  g_clear_error (&unbounded);
+  g_clear_error (&unknown);
 }
 
 /* Of these, none may change pixels behind the back of a calibration, or a rate

@@ -2,7 +2,6 @@
 #include "cameras.h"
 
 #include <algorithm>
-#include <optional>
 #include <vector>
 
 #include <arv.h>
@@ -26,6 +25,18 @@ cameras_found ()
   return names.empty () ? "no camera was found; check its power and its network"
                         : "the cameras that were found are " + names +
                               "; set --camera to one of them";
+}
+
+std::optional<std::string>
+feature_text (ArvDevice *device, const char *name)
+{
+  ArvGcNode *node = arv_device_get_feature (device, name);
+  if (!ARV_IS_GC_FEATURE_NODE (node) ||
+      !arv_gc_feature_node_is_available (ARV_GC_FEATURE_NODE (node), nullptr))
+    return std::nullopt;
+  const char *text = arv_gc_feature_node_get_value_as_string (
+      ARV_GC_FEATURE_NODE (node), nullptr);
+  return text ? std::optional<std::string> (text) : std::nullopt;
 }
 
 namespace

@@ -2,17 +2,23 @@
 /* What GenICam cameras say of themselves. */
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include <gst/gst.h>
 
 #include "base/result.h"
 
+struct _ArvDevice; // of Aravis, which not every build has
+
 namespace codedexposure::app
 {
 
 /** Which cameras answer, or that none does, for a message. Takes a second. */
 std::string cameras_found ();
+
+/** The text of a feature of @p camera; none: it lacks that. */
+std::optional<std::string> feature_text (_ArvDevice *camera, const char *name);
 
 /** Both are included. */
 struct Between {

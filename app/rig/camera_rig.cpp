@@ -184,19 +184,6 @@ CameraRig::make_pipeline ()
 
 /* ------------------------------------------------------------ the parts -- */
 
-/** The text of a feature; none if the camera lacks it. */
-std::optional<std::string>
-feature_text (ArvDevice *device, const char *name)
-{
-  ArvGcNode *node = arv_device_get_feature (device, name);
-  if (!ARV_IS_GC_FEATURE_NODE (node) ||
-      !arv_gc_feature_node_is_available (ARV_GC_FEATURE_NODE (node), nullptr))
-    return std::nullopt;
-  const char *text = arv_gc_feature_node_get_value_as_string (
-      ARV_GC_FEATURE_NODE (node), nullptr);
-  return text ? std::optional<std::string> (text) : std::nullopt;
-}
-
 void
 CameraRig::read_features (ArvCamera *camera)
 {

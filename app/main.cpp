@@ -15,7 +15,7 @@
 #include "base/text.h"
 #include "command.h"
 #include "options/common.h"
-#include "pipeline/plugin.h"
+#include "pipeline/program.h"
 
 namespace codedexposure::app
 {
@@ -24,7 +24,6 @@ namespace
 {
 
 constexpr const char *kName = "codedexposure";
-constexpr std::size_t kPart = std::size_t (1) << 20; ///< bytes read at once
 
 /** A command, its place on the command line, and its options. */
 struct Node {
@@ -112,30 +111,7 @@ words_for (const CLI::ParseError &error, const CLI::App &app, bool in_group)
   return text;
 }
 
-/* A number of this program file, which another build does not have. */
-std::string
-build_id ()
-{
-  std::error_code ignored;
-  const auto program =
-      std::filesystem::read_symlink ("/proc/self/exe", ignored);
-  const auto plugin =
-      program.parent_path ().parent_path () / "gst/libgstcodedexposure.so";
-  std::uint64_t id = 0;
-  std::string part;
-  for (const auto &path : {program, plugin})
-    for (std::ifstream file (path, std::ios::binary); file;) {
-      part.resize (kPart);
-      file.read (part.data (), kPart);
-      part.resize (std::size_t (file.gcount ()));
-      id = id * 31 + std::hash<std::string>{}(part);
-    }
-  char text[17];
-  std::snprintf (
-      text, sizeof text, "%016llx", static_cast<unsigned long long> (id));
-  return text;
-}
-
+/* With commands of its own, the one of them; null: there is none. */
 const Node *
 chosen (const std::vector<Node> &nodes)
 {

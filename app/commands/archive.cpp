@@ -2,7 +2,7 @@
 /* codedexposure archive: decodes archives of recordings on a batch engine,
  * which the Python package drives. */
 #include "command.h"
-#include "pipeline/python.h"
+#include "pipeline/program.h"
 
 namespace codedexposure::app
 {

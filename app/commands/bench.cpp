@@ -21,7 +21,7 @@
 #include "emulation/served_bench.h"
 #include "emulation/shared_trigger.h"
 #include "options/board.h"
-#include "pipeline/plugin.h"
+#include "pipeline/program.h"
 #include "pipeline/source.h"
 #include "pipeline/status.h"
 

@@ -7,7 +7,7 @@
 #include "base/text.h"
 #include "command.h"
 #include "pipeline/guide.h"
-#include "pipeline/plugin.h"
+#include "pipeline/program.h"
 #include "pipeline/source.h"
 #include "pipeline/video_output.h"
 

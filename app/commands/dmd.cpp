@@ -15,7 +15,7 @@
 #include "dmd/usb_bus.h"
 #include "options/board.h"
 #include "pipeline/messages.h"
-#include "pipeline/plugin.h"
+#include "pipeline/program.h"
 
 namespace codedexposure::app
 {

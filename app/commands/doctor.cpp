@@ -21,7 +21,7 @@
 #include "pages/folder.h"
 #include "pipeline/codec_choice.h"
 #include "pipeline/messages.h"
-#include "pipeline/plugin.h"
+#include "pipeline/program.h"
 #include "rig/camera_rig.h"
 
 namespace codedexposure::app

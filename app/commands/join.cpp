@@ -14,7 +14,7 @@
 #include "common/meta.h"
 #include "pipeline/messages.h"
 #include "pipeline/pads.h"
-#include "pipeline/plugin.h"
+#include "pipeline/program.h"
 #include "pipeline/recording.h"
 #include "pipeline/video_output.h"
 

@@ -2,7 +2,7 @@
 /* codedexposure live: coded frames and subframes in a window. */
 #include "command.h"
 #include "options/picture.h"
-#include "pipeline/plugin.h"
+#include "pipeline/program.h"
 #include "pipeline/recording.h"
 #include "pipeline/source.h"
 #include "window/window.h"

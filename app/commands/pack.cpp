@@ -17,7 +17,7 @@
 #include "common/record.h"
 #include "pipeline/messages.h"
 #include "pipeline/pads.h"
-#include "pipeline/plugin.h"
+#include "pipeline/program.h"
 #include "pipeline/recording.h"
 #include "pipeline/status.h"
 #include "record/matroska.h"

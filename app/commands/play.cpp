@@ -6,7 +6,7 @@
 #include "command.h"
 #include "options/picture.h"
 #include "pipeline/decoder.h"
-#include "pipeline/plugin.h"
+#include "pipeline/program.h"
 #include "pipeline/recording.h"
 #include "record/matroska.h"
 #include "window/window.h"

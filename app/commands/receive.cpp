@@ -5,7 +5,7 @@
 #include "options/network.h"
 #include "options/picture.h"
 #include "pipeline/decoder.h"
-#include "pipeline/plugin.h"
+#include "pipeline/program.h"
 #include "pipeline/recording.h"
 #include "pipeline/status.h"
 #include "pipeline/video_output.h"

@@ -3,7 +3,7 @@
  * a file. */
 #include "command.h"
 #include "pipeline/codec_choice.h"
-#include "pipeline/plugin.h"
+#include "pipeline/program.h"
 #include "pipeline/recording.h"
 #include "pipeline/source.h"
 

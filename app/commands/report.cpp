@@ -12,7 +12,7 @@
 #include "pages/report_page.h"
 #include "pipeline/decoder.h"
 #include "pipeline/messages.h"
-#include "pipeline/plugin.h"
+#include "pipeline/program.h"
 #include "pipeline/recording.h"
 #include "pipeline/status.h"
 #include "pipeline/video_output.h"

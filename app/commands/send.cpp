@@ -2,7 +2,7 @@
 /* codedexposure send: coded frames to other machines. */
 #include "command.h"
 #include "options/network.h"
-#include "pipeline/plugin.h"
+#include "pipeline/program.h"
 #include "pipeline/source.h"
 
 namespace codedexposure::app

@@ -2,7 +2,7 @@
 /* codedexposure simulate: a video or a test picture through the simulated
  * bench. */
 #include "command.h"
-#include "pipeline/plugin.h"
+#include "pipeline/program.h"
 #include "pipeline/recording.h"
 #include "pipeline/source.h"
 

@@ -56,35 +56,35 @@ class File : public Output
 {
 public:
   File (GstElement *element, const char *property, const std::string &name,
-      const Outputs::FileKind &kind)
-      : element_ (element), property_ (property), kind_ (kind),
-        part_ (name, kind.folder_with ? Part::kFolder : Part::kFile)
+      const FileKind &of_kind)
+      : Output (name, of_kind), element_ (element), property_ (property)
   {
+    part_ = std::make_unique<Part> (
+        name_, kind.folder_with ? Part::kFolder : Part::kFile);
     if (kind.frames)
       pad_.reset (GST_PAD (gst_object_ref (kind.frames)));
   }
 
   Result<void> check_name (bool replace) override
   {
-    const std::string &name = part_.name ();
     std::error_code ignored;
-    if (kind_.folder_with && fs::exists (name, ignored) &&
-        !fs::exists (fs::path (name) / kind_.folder_with, ignored))
-      return Error{name + " exists and has another content; choose another "
-                          "name"};
-    if (!kind_.folder_with && fs::is_directory (name, ignored))
-      return Error{name + " is a folder; give the name of a file"};
-    if (!replace && fs::exists (fs::symlink_status (name, ignored)))
-      return Error{name + " exists; choose another name, or set --force to "
-                          "replace it"};
+    if (kind.folder_with && fs::exists (name_, ignored) &&
+        !fs::exists (fs::path (name_) / kind.folder_with, ignored))
+      return Error{name_ + " exists and has another content; choose another "
+                           "name"};
+    if (!kind.folder_with && fs::is_directory (name_, ignored))
+      return Error{name_ + " is a folder; give the name of a file"};
+    if (!replace && fs::exists (fs::symlink_status (name_, ignored)))
+      return Error{name_ + " exists; choose another name, or set --force to "
+                           "replace it"};
     return {};
   }
   Result<void> claim (bool replace) override
   {
     replace_ = replace;
-    if (auto claimed = part_.claim (replace); !claimed)
+    if (auto claimed = part_->claim (replace); !claimed)
       return claimed;
-    g_object_set (element_, property_, part_.path ().c_str (), nullptr);
+    g_object_set (element_, property_, part_->path ().c_str (), nullptr);
     if (pad_)
       watch_buffers (
           pad_.get (), [this] (GstPad *, GstBuffer *) { frames_++; });
@@ -92,7 +92,7 @@ public:
   }
   void name_element () override
   {
-    g_object_set (element_, property_, part_.name ().c_str (), nullptr);
+    g_object_set (element_, property_, name_.c_str (), nullptr);
   }
   Result<void> finished () const override
   {
@@ -100,38 +100,28 @@ public:
     const bool may_fail =
         g_object_class_find_property (G_OBJECT_GET_CLASS (element_), "problem");
     if (may_fail && !text_property (element_, "problem").empty ())
-      return Error{part_.name () +
+      return Error{name_ +
                    " could not be finished; what was written "
                    "is in " +
-                   part_.path ()};
+                   part_->path ()};
     return {};
   }
-  Result<void> publish () override { return part_.publish (replace_); }
-  void discard () override { part_.discard (); }
+  Result<void> publish () override { return part_->publish (replace_); }
   void recount () override
   {
-    if (const auto written = recording_info (part_.path ()); pad_ && written)
+    if (const auto written = recording_info (part_->path ()); pad_ && written)
       frames_ = written->times.size ();
   }
   bool has_content () const override
   {
-    return (!pad_ || frames_ > 0) && !part_.is_empty () &&
-           !(part_.name ().ends_with (".mp4") &&
-               is_mp4_without_index (part_.path ()));
+    return (!pad_ || frames_ > 0) && !part_->is_empty () &&
+           !(name_.ends_with (".mp4") && is_mp4_without_index (part_->path ()));
   }
-  const std::string &name () const override { return part_.name (); }
-  const std::string &part () const override { return part_.path (); }
-  bool is_sidecar () const override { return kind_.sidecar; }
-  bool is_folder () const override { return kind_.folder_with; }
-  bool is_recording () const override { return kind_.recording; }
 
 private:
   GstElement *element_; // of the pipeline, which outlives this
   const char *property_;
-  Outputs::FileKind kind_;
   ObjectPtr<GstPad> pad_;
-  Part part_;
-  bool replace_ = false;
 };
 
 /* The files that elements read: those of sources, and those that settings
@@ -258,7 +248,7 @@ Outputs::check (GstElement *pipeline) const
         {output->name (), output->name () + ".part"})
       if (auto checked = check_is_no_input (written, inputs); !checked)
         return checked;
-    if (!output->is_recording ())
+    if (!output->kind.recording)
       if (auto checked = check_is_no_recording (output->name ()); !checked)
         return checked;
     for (const std::string &written : {output->name (), output->table ()})
@@ -268,7 +258,8 @@ Outputs::check (GstElement *pipeline) const
   }
   for (const auto &output : outputs_)
     for (const fs::path &place : places)
-      if (output->is_folder () && lies_in (place, place_of (output->name ())))
+      if (output->kind.folder_with &&
+          lies_in (place, place_of (output->name ())))
         return Error{place.string () + " lies in " + output->name () +
                      ", which is one output; name a file beside it"};
   return {};
@@ -331,14 +322,14 @@ Outputs::finish (Finish how, bool failed)
       output->recount ();
   bool only_sidecars = true, have_frames = false;
   for (const auto &output : outputs_) {
-    only_sidecars &= output->is_sidecar ();
-    have_frames |= !output->is_sidecar () && output->has_content ();
+    only_sidecars &= output->kind.sidecar;
+    have_frames |= !output->kind.sidecar && output->has_content ();
   }
   std::vector<std::string> errors;
   published_ = how == Finish::publish;
   for (const auto &output : outputs_) {
     const bool described =
-        !output->is_sidecar () || only_sidecars || have_frames;
+        !output->kind.sidecar || only_sidecars || have_frames;
     if (how == Finish::discard || !output->has_content () || !described) {
       output->discard ();
       continue;

@@ -18,11 +18,27 @@
 namespace codedexposure::app
 {
 
+/** What an output is, and where its frames are counted. */
+struct FileKind {
+  GstPad *frames = nullptr; ///< each buffer is a frame
+  bool sidecar = false;     ///< only describes the frames of other outputs
+  bool recording = false;   ///< of coded frames, and may replace another one
+  /** It is a folder to which nothing else is written; a file of this name in it
+   * shows that it is of this kind, and may be replaced. */
+  const char *folder_with = nullptr;
+};
+
 /** A file, or pictures, of one element. */
 class Output
 {
 public:
+  Output (std::string name, const FileKind &of_kind)
+      : kind (of_kind), name_ (std::move (name))
+  {
+  }
   virtual ~Output () = default;
+
+  const FileKind kind;
 
   /** Error: the name cannot be one of an output, or what has it may not be
    * replaced. */
@@ -39,26 +55,23 @@ public:
   /** After an error: frames that came may not be in the file. */
   virtual void recount () {}
   /** Removes what was written. */
-  virtual void discard () = 0;
+  void discard () { part_->discard (); }
   /** Whether there are frames to publish. */
   virtual bool has_content () const = 0;
 
-  virtual const std::string &name () const = 0;
+  const std::string &name () const { return name_; }
   /** Where it is written until it is published. */
-  virtual const std::string &part () const = 0;
+  const std::string &part () const { return part_->path (); }
   guint64 frames () const { return frames_; }
-  /** Whether it only describes the frames that other outputs have. */
-  virtual bool is_sidecar () const { return false; }
-  /** Whether it is a folder to which nothing else is written. */
-  virtual bool is_folder () const { return false; }
   /** A file that it also writes; empty: none. */
   virtual std::string table () const { return {}; }
-  /** Whether it is a recording, which may replace another one. */
-  virtual bool is_recording () const { return false; }
   /** What a shell has to do before the element can write the name itself. */
   virtual std::string preparation () const { return {}; }
 
 protected:
+  std::string name_;
+  std::unique_ptr<Part> part_; // not null after claim ()
+  bool replace_ = false;
   /** Frames that the element got. */
   std::atomic<guint64> frames_ = 0;
 };
@@ -73,15 +86,6 @@ public:
   /** A file that is read, but by no element of the pipeline. */
   void reads (const std::string &path) { inputs_.push_back (path); }
 
-  /** Where frames for a file are counted, and what the file is. */
-  struct FileKind {
-    GstPad *frames = nullptr; ///< each buffer is a frame
-    bool sidecar = false;     ///< describes the frames of other files
-    bool recording = false;   ///< of coded frames
-    /** It is a folder; a file of this name in it shows that it is of this
-     * kind, and may be replaced. */
-    const char *folder_with = nullptr;
-  };
   /** @p element writes the file @p name, which it gets in its property @p
    * property. A pipe, or a name such as /dev/null, is written directly. */
   void file (GstElement *element, const char *property, const std::string &name,

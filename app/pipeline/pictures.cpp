@@ -135,7 +135,7 @@ PictureNames::path (const std::string &file) const
 }
 
 Pictures::Pictures (GstElement *sink, GstPad *coded, const std::string &format)
-    : sink_ (sink), coded_ (coded), format_ (format), name_ (format)
+    : Output (format, {}), sink_ (sink), coded_ (coded), format_ (format)
 {
 }
 

@@ -47,10 +47,7 @@ public:
   std::string table () const override;
   std::string preparation () const override;
   Result<void> publish () override;
-  void discard () override { part_->discard (); }
   bool has_content () const override;
-  const std::string &name () const override { return name_; }
-  const std::string &part () const override { return part_->path (); }
 
 private:
   bool fills_named_folder () const
@@ -66,10 +63,8 @@ private:
 
   GstElement *sink_; // of the pipeline, which outlives this
   GstPad *coded_;
-  std::string format_, name_;
+  std::string format_;
   PictureNames names_;
-  std::unique_ptr<Part> part_;
-  bool replace_ = false;
   /* Streaming thread, and publish (), which comes after it: */
   std::unique_ptr<std::FILE, int (*) (std::FILE *)> table_{
       nullptr, std::fclose};

@@ -4,7 +4,10 @@
 #include <cmath>
 #include <cstdlib>
 
+#include <gst/video/gstvideoaggregator.h>
+
 #include "failure.h"
+#include "pipeline/pads.h"
 #include "pipeline/video_output.h"
 #include "stats/event_watch.h"
 #include "window/screen.h"
@@ -57,6 +60,38 @@ add_pane (Chain chain, std::size_t index, std::optional<int> bits,
   pane.mixed.reset (gst_element_request_pad_simple (compositor, "sink_%u"));
   chain.to (compositor, GST_PAD_NAME (pane.mixed.get ()));
   return pane;
+}
+
+/* Called by the compositor's own thread, which alone changes what it asks. */
+bool
+has_all_inputs (GstElement *compositor)
+{
+  return gst_element_foreach_sink_pad (
+      compositor,
+      [] (GstElement *, GstPad *pad, gpointer) -> gboolean {
+        return GST_VIDEO_INFO_WIDTH (&GST_VIDEO_AGGREGATOR_PAD (pad)->info) >
+                   0 ||
+               gst_aggregator_pad_is_eos (GST_AGGREGATOR_PAD (pad));
+      },
+      nullptr);
+}
+
+/* @compositor shows nothing until all of its inputs have a size or have ended.
+ * It does not wait for live ones that are late: its first pictures would be
+ * smaller, and some windows keep the size of the first picture. */
+void
+wait_for_inputs (GstElement *compositor)
+{
+  /* Sticky events that are dropped come again before the next frame. */
+  add_probe (pad_of (compositor, "src").get (),
+      GST_PAD_PROBE_TYPE_DATA_DOWNSTREAM,
+      [compositor] (GstPad *, GstPadProbeInfo *info) {
+        const bool ends = (info->type & GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM) &&
+                          GST_EVENT_TYPE (gst_pad_probe_info_get_event (
+                              info)) == GST_EVENT_EOS;
+        return ends || has_all_inputs (compositor) ? GST_PAD_PROBE_REMOVE
+                                                   : GST_PAD_PROBE_DROP;
+      });
 }
 
 constexpr double kRemembered = 10; // s
@@ -181,6 +216,7 @@ add_window_branch (const std::vector<Chain> &sources,
   Graph &graph = sources.front ().graph ();
   WindowBranch branch;
   branch.compositor = graph.add ("compositor", {{"background", "black"}});
+  wait_for_inputs (branch.compositor);
   for (const Chain &source : sources)
     branch.panes.push_back (add_pane (source, branch.panes.size (), bits,
         branch.compositor, !paced.empty ()));

@@ -15,7 +15,6 @@
 #include "pipeline/pads.h"
 #include "window/pane.h"
 #include "window/screen.h"
-#include "window/whole_picture.h"
 
 namespace codedexposure::app
 {
@@ -70,7 +69,6 @@ Window::Window (WindowBranch branch, GstPad *coded, Setup setup)
     watch (*pane);
     panes_.push_back (std::move (pane));
   }
-  wait_for_inputs (branch.compositor);
   /* The layout is set before the caps reach the panes. */
   add_probe (coded, GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
       [this] (GstPad *, GstPadProbeInfo *info) {

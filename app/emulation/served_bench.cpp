@@ -172,35 +172,29 @@ ServedBench::environment () const
 ServedBench::ServedBench () = default;
 ServedBench::~ServedBench () = default;
 
-Result<void>
-ServedBench::set_up (const std::string &board, const std::string &faults,
+Result<std::unique_ptr<ServedBench>>
+ServedBench::open (const std::string &board, const std::string &faults,
     Extent size, std::vector<GigeCameraOptions> cameras)
 {
   ASSIGN_OR_RETURN (const int kind, board_kind (board));
   ASSIGN_OR_RETURN (SickBenchOptions options, bench_of (faults, size, cameras));
   bool dark = options.has ("camera-missing");
-  slow_disk_ = options.has ("slow-disk");
-  ASSIGN_OR_RETURN (bench_, LiveBench::make (std::move (options), kind));
-  usb_ = std::make_unique<Usb> ();
-  RETURN_IF_ERROR (usb_->plug (*bench_));
-  LiveBench *seen = bench_.get ();
+  std::unique_ptr<ServedBench> served (new ServedBench);
+  served->slow_disk_ = options.has ("slow-disk");
+  ASSIGN_OR_RETURN (
+      served->bench_, LiveBench::make (std::move (options), kind));
+  served->usb_ = std::make_unique<Usb> ();
+  RETURN_IF_ERROR (served->usb_->plug (*served->bench_));
+  LiveBench *seen = served->bench_.get ();
   for (GigeCameraOptions &camera : cameras) {
     look_at (*seen, camera);
-    seen = bench_->second ();
+    seen = served->bench_->second ();
     if (std::exchange (dark, false))
       continue;
-    ASSIGN_OR_RETURN (cameras_.emplace_back (), GigeCamera::open (camera, {}));
+    ASSIGN_OR_RETURN (
+        served->cameras_.emplace_back (), GigeCamera::open (camera, {}));
   }
-  options_ = std::move (cameras);
-  return {};
-}
-
-Result<std::unique_ptr<ServedBench>>
-ServedBench::open (const std::string &board, const std::string &faults,
-    Extent size, std::vector<GigeCameraOptions> cameras)
-{
-  std::unique_ptr<ServedBench> served (new ServedBench);
-  RETURN_IF_ERROR (served->set_up (board, faults, size, std::move (cameras)));
+  served->options_ = std::move (cameras);
   return served;
 }
 

@@ -46,8 +46,6 @@ private:
   struct Usb;
 
   ServedBench ();
-  Result<void> set_up (const std::string &board, const std::string &faults,
-      Extent size, std::vector<GigeCameraOptions> cameras);
 
   bool slow_disk_ = false;
   std::vector<GigeCameraOptions> options_;

@@ -53,7 +53,7 @@ private:
   void say_serving (const GigeCameraOptions &options);
   void read_faults (GigeCamera &camera);
   Exit serve_until_end (const sigset_t &ends);
-  int run_command (const sigset_t &before) const;
+  int run_command (const sigset_t &signals, const sigset_t &before) const;
   std::vector<std::string> words () const;
 
   SourceOptions source_;
@@ -62,7 +62,7 @@ private:
   std::optional<Nanoseconds> jitter_;
   std::optional<int> cameras_;
   std::optional<double> drift_, packet_loss_, trigger_rate_;
-  bool no_outputs_ = false, log_ = false, verbose_ = false, second_ = false;
+  bool no_outputs_ = false, log_ = false, second_ = false;
   std::vector<std::string> command_;
   Status status_{"bench", false};
   std::unique_ptr<SharedTrigger> trigger_; // of both cameras
@@ -253,7 +253,7 @@ Bench::words () const
 /* A terminal sends its signals to both, and the camera must not end before the
  * command that reads it; other signals are passed on. */
 int
-Bench::run_command (const sigset_t &before) const
+Bench::run_command (const sigset_t &signals, const sigset_t &before) const
 {
   const std::vector<std::string> words = this->words ();
   std::vector<char *> arguments;
@@ -274,10 +274,6 @@ Bench::run_command (const sigset_t &before) const
         std::strerror (errno));
     _exit (127);
   }
-  sigset_t signals;
-  sigemptyset (&signals);
-  for (const int number : {SIGCHLD, SIGINT, SIGTERM, SIGHUP})
-    sigaddset (&signals, number);
   int status = 0;
   while (waitpid (child, &status, WNOHANG) == 0) {
     siginfo_t info = {};
@@ -300,12 +296,11 @@ Bench::run ()
   }
   check ();
   name_this_program ();
-  sigset_t ends, before;
-  sigemptyset (&ends);
+  sigset_t signals, before;
+  sigemptyset (&signals);
   for (const int number : {SIGCHLD, SIGINT, SIGTERM, SIGHUP})
-    sigaddset (&ends, number);
-  sigprocmask (SIG_BLOCK, &ends, &before);
-  sigdelset (&ends, SIGCHLD);
+    sigaddset (&signals, number);
+  sigprocmask (SIG_BLOCK, &signals, &before);
   if (!address_)
     value_of (leave_network (second_ ? 2 : cameras_.value_or (1)));
   start_gstreamer ();
@@ -319,9 +314,11 @@ Bench::run ()
   else
     for (int number = 1; number <= cameras; number++)
       open_camera (number);
-  if (address_)
-    return serve_until_end (ends);
-  return Exit (run_command (before));
+  if (address_) {
+    sigdelset (&signals, SIGCHLD); // of what looks for plugins
+    return serve_until_end (signals);
+  }
+  return Exit (run_command (signals, before));
 }
 
 } // namespace

@@ -76,13 +76,7 @@ open (const Arguments &arguments)
 DmdStatus
 status_of (Dmd &dmd)
 {
-  return value_of (dmd.status (), Exit::failed);
-}
-
-Failure
-failed (const Dmd &dmd, const char *how)
-{
-  return {Exit::failed, Error{dmd.info ().name + how}};
+  return value_of (dmd.status ());
 }
 
 Json
@@ -103,7 +97,7 @@ describe (const DmdInfo &info)
 Exit
 list (const Arguments &arguments)
 {
-  const auto boards = value_of (list_usb_boards (), Exit::failed);
+  const auto boards = value_of (list_usb_boards ());
   Json result = Json::array ();
   for (const UsbBoard &board : boards) {
     Json entry{{"device", "usb:" + board.port},
@@ -137,7 +131,7 @@ stop (const Arguments &arguments)
   const auto dmd = open (arguments);
   dmd->stop ();
   if (status_of (*dmd).running)
-    throw failed (*dmd, " did not stop; try again, or switch it off");
+    fail (dmd->info ().name + " did not stop; try again, or switch it off");
   arguments.print ({{"device", dmd->info ().name}, {"running", false}});
   return Exit::done;
 }
@@ -154,8 +148,7 @@ send (const Arguments &arguments, Dmd &dmd, const Schedule &schedule,
   const ProgressLine line (arguments);
   const auto start = Clock::now ();
   value_of (dmd.upload (schedule, arguments.stop,
-                [&] (int sent, int total) { line.show (sent, total); }),
-      Exit::failed);
+      [&] (int sent, int total) { line.show (sent, total); }));
   result["upload-took"] =
       time_text (std::chrono::nanoseconds (Clock::now () - start).count ());
 }
@@ -189,8 +182,9 @@ run (const Arguments &arguments, Dmd &dmd, const Json &result)
   while (over && !duration);
   dmd.stop ();
   if (dmd.running ())
-    throw failed (dmd, " did not acknowledge the stop and may still show "
-                       "masks; try again, or switch it off");
+    fail (dmd.info ().name +
+          " did not acknowledge the stop and may still show masks; try again, "
+          "or switch it off");
   arguments.print (result);
   return !over && duration ? Exit::interrupted : Exit::done;
 }
@@ -202,7 +196,7 @@ start (const Arguments &arguments)
   const auto [schedule, plan] = fit (arguments, dmd->info ());
   Json result{{"device", dmd->info ().name}};
   send (arguments, *dmd, schedule, result);
-  value_of (dmd->start (plan, arguments.stop), Exit::failed);
+  value_of (dmd->start (plan, arguments.stop));
   return run (arguments, *dmd, result);
 }
 
@@ -219,10 +213,9 @@ still_mask (const Schedule &schedule, const std::string &name)
     still.on = [schedule, slot = *mask] (
                    int x, int y) { return schedule.on (x, y, slot); };
   else
-    throw Failure{Exit::usage,
-        Error{"cannot show mask " + in_quotes (name) + "; use 0 to " +
-              std::to_string (schedule.slots () - 1) + " for " +
-              schedule.text () + ", or on, or off"}};
+    usage_error ("cannot show mask " + in_quotes (name) + "; use 0 to " +
+                 std::to_string (schedule.slots () - 1) + " for " +
+                 schedule.text () + ", or on, or off");
   return still;
 }
 
@@ -232,7 +225,7 @@ show (const Arguments &arguments)
   const auto dmd = open (arguments);
   const auto [schedule, plan] = fit (arguments, dmd->info ());
   const StillMask mask = still_mask (schedule, arguments.mask);
-  value_of (dmd->show (mask, plan, arguments.stop), Exit::failed);
+  value_of (dmd->show (mask, plan, arguments.stop));
   return run (
       arguments, *dmd, {{"device", dmd->info ().name}, {"shows", mask.name}});
 }
@@ -243,7 +236,7 @@ Exit
 guard (const Arguments &arguments)
 {
   std::signal (SIGHUP, SIG_IGN); // other signals request a stop
-  value_of (stand_guard (STDIN_FILENO, arguments.device), Exit::failed);
+  value_of (stand_guard (STDIN_FILENO, arguments.device));
   return Exit::done;
 }
 
@@ -261,14 +254,14 @@ selftest (const Arguments &asked)
   const auto [schedule, plan] = fit (arguments, dmd->info ());
   Json result = describe (dmd->info ());
   send (arguments, *dmd, schedule, result);
-  value_of (dmd->start (plan, arguments.stop), Exit::failed);
+  value_of (dmd->start (plan, arguments.stop));
   const auto running = dmd->status ();
   dmd->stop ();
   const bool stopped = !status_of (*dmd).running;
-  if (!value_of (running, Exit::failed).running)
-    throw failed (*dmd, " reports that it does not run");
+  if (!value_of (running).running)
+    fail (dmd->info ().name + " reports that it does not run");
   if (!stopped)
-    throw failed (*dmd, " did not stop");
+    fail (dmd->info ().name + " did not stop");
   result["selftest"] = "passed";
   arguments.print (result);
   return Exit::done;

@@ -17,14 +17,9 @@ namespace
 const char *
 codec_text (MatroskaHead::Codec codec)
 {
-  switch (codec) {
-  case MatroskaHead::Codec::ffv1:
-    return "ffv1";
-  case MatroskaHead::Codec::raw:
-    return "raw";
-  default:
-    return "other";
-  }
+  return codec == MatroskaHead::Codec::ffv1  ? "ffv1"
+         : codec == MatroskaHead::Codec::raw ? "raw"
+                                             : "other";
 }
 
 class Info

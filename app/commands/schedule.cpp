@@ -99,12 +99,6 @@ write (const std::string &path, const std::string &content)
           "; check that the folder exists and the disk has space");
 }
 
-std::string
-text_of (const Bytes &bytes)
-{
-  return {bytes.begin (), bytes.end ()};
-}
-
 /* One file for each mask, or for 24. */
 std::vector<std::string>
 write_bitmaps (const Arguments &arguments, const Schedule &schedule,
@@ -123,7 +117,7 @@ write_bitmaps (const Arguments &arguments, const Schedule &schedule,
                             ? encode_plane_bitmap (renderer.render<PlanePixel> (
                                   plan.of_image (picture)))
                             : encode_bitmap (renderer.render (picture));
-    write (files[std::size_t (picture)], text_of (bytes));
+    write (files[std::size_t (picture)], {bytes.begin (), bytes.end ()});
   }
   return files;
 }
@@ -149,7 +143,7 @@ write_alp (const Arguments &arguments, const DmdInfo &info,
       fail ("interrupted", Exit::interrupted);
     append_bit_plane (planes, renderer.render (mask));
   }
-  write (files[0], text_of (planes));
+  write (files[0], {planes.begin (), planes.end ()});
   write (
       files[1], alp_script (sequence, info.size,
                     std::filesystem::path (files[0]).filename ().string (),

@@ -49,15 +49,6 @@ tr:first-child th{white-space:nowrap} .words{white-space:normal;text-align:left}
   .chart text{fill:#bbb} .chart path{stroke:#444}}
 )";
 
-constexpr std::uint32_t
-big_endian (std::string_view bytes)
-{
-  std::uint32_t value = 0;
-  for (const char byte : bytes)
-    value = value << 8 | std::uint8_t (byte);
-  return value;
-}
-
 } // namespace
 
 std::string
@@ -131,8 +122,8 @@ png_size (std::string_view png)
   constexpr std::size_t kWidth = 16, kHeight = 20, kEnd = 24;
   if (png.size () < kEnd)
     return {};
-  return {int (big_endian (png.substr (kWidth, 4))),
-      int (big_endian (png.substr (kHeight, 4)))};
+  return {int (GST_READ_UINT32_BE (png.data () + kWidth)),
+      int (GST_READ_UINT32_BE (png.data () + kHeight))};
 }
 
 std::string

@@ -22,18 +22,6 @@ shared_settings (const DecodeOptions &options)
 
 } // namespace
 
-Chain
-DecoderPads::coded () const
-{
-  return pictures.graph ().from (decoder, "coded");
-}
-
-Chain
-DecoderPads::uncertainty () const
-{
-  return pictures.graph ().from (decoder, "uncertainty");
-}
-
 DecoderPads
 add_demux (Job &job, Chain &frames, const DecodeOptions &options,
     std::optional<int> region)

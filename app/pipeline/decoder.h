@@ -14,9 +14,12 @@ struct DecoderPads {
   GstElement *decoder;
 
   /** The coded frames. */
-  Chain coded () const;
+  Chain coded () const { return pictures.graph ().from (decoder, "coded"); }
   /** The uncertainty of a fusion. */
-  Chain uncertainty () const;
+  Chain uncertainty () const
+  {
+    return pictures.graph ().from (decoder, "uncertainty");
+  }
 };
 
 /** Adds a demultiplexer behind @p frames. @p region: its subframes instead of

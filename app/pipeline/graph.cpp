@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "graph.h"
 
+#include <utility>
+
 #include "failure.h"
 #include "pipeline/messages.h"
 
@@ -233,23 +235,11 @@ Graph::from (GstElement *element, const char *pad)
 }
 
 Chain &
-Chain::to (const char *factory, const Settings &settings)
-{
-  return to (graph_->add (factory, settings));
-}
-
-Chain &
 Chain::to (GstElement *element, const char *pad)
 {
   graph_->link (last_, std::exchange (pad_, nullptr), element, pad);
   last_ = element;
   return *this;
-}
-
-Chain &
-Chain::caps (const std::string &caps)
-{
-  return to ("capsfilter", {{"caps", caps}});
 }
 
 Chain &
@@ -273,16 +263,12 @@ each_element (GstElement *bin, const std::function<void (GstElement *)> &visit)
 }
 
 std::string
-factory_of (GstElement *element)
+factory_of (gpointer object)
 {
-  GstElementFactory *factory = gst_element_get_factory (element);
+  GstElementFactory *factory =
+      GST_IS_ELEMENT (object) ? gst_element_get_factory (GST_ELEMENT (object))
+                              : nullptr;
   return factory ? GST_OBJECT_NAME (factory) : "";
-}
-
-std::string
-factory_of (GstObject *object)
-{
-  return GST_IS_ELEMENT (object) ? factory_of (GST_ELEMENT (object)) : "";
 }
 
 std::string

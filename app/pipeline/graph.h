@@ -95,11 +95,17 @@ public:
   }
 
   /** Links a new element; returns this chain, which now ends with it. */
-  Chain &to (const char *factory, const Settings &settings = {});
+  Chain &to (const char *factory, const Settings &settings = {})
+  {
+    return to (graph_->add (factory, settings));
+  }
   /** Links an element of the pipeline, at its pad @p pad if named. */
   Chain &to (GstElement *element, const char *pad = nullptr);
   /** A filter for these caps. */
-  Chain &caps (const std::string &caps);
+  Chain &caps (const std::string &caps)
+  {
+    return to ("capsfilter", {{"caps", caps}});
+  }
   /** A queue that holds @p frames buffers of any size and time. */
   Chain &queue (int frames, const char *leaky = "no");
 
@@ -118,10 +124,9 @@ void each_element (
 
 using gst::pad_of;
 
-/** The name of the factory of @p element; empty: it has none. */
-std::string factory_of (GstElement *element);
-/** The same of what may be no element. */
-std::string factory_of (GstObject *object);
+/** The name of the factory of the element @p object; empty: it has none, or is
+ * no element. */
+std::string factory_of (gpointer object);
 /** A property of @p element that is a text; empty: it is not set. */
 std::string text_property (GstElement *element, const std::string &property);
 

@@ -169,10 +169,7 @@ shell_word (const std::string &text)
 {
   if (!text.empty () && text.find_first_not_of (kPlain) == text.npos)
     return text;
-  std::string word = "'";
-  for (const char c : text)
-    word += c == '\'' ? std::string ("'\\''") : std::string (1, c);
-  return word + "'";
+  return CharPtr (g_shell_quote (text.c_str ())).get ();
 }
 
 std::string

@@ -13,6 +13,7 @@
 #include <gst/video/video.h>
 
 #include "common/raii.h"
+#include "pipeline/pads.h"
 #include "schedule/timing.h"
 
 namespace codedexposure::app
@@ -38,10 +39,12 @@ class FrameTap
 public:
   explicit FrameTap (gst::ObjectPtr<GstPad> pad) : pad_ (std::move (pad))
   {
-    probe_ = gst_pad_add_probe (pad_.get (),
-        GstPadProbeType (
-            GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM),
-        on_item, this, nullptr);
+    probe_ = add_probe (pad_.get (),
+        GST_PAD_PROBE_TYPE_BUFFER | GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
+        [this] (GstPad *at, GstPadProbeInfo *info) {
+          add (at, info);
+          return GST_PAD_PROBE_OK;
+        });
   }
   ~FrameTap () { gst_pad_remove_probe (pad_.get (), probe_); }
   FrameTap (const FrameTap &) = delete;
@@ -78,12 +81,6 @@ public:
   }
 
 private:
-  static GstPadProbeReturn on_item (
-      GstPad *pad, GstPadProbeInfo *info, gpointer self)
-  {
-    static_cast<FrameTap *> (self)->add (pad, info);
-    return GST_PAD_PROBE_OK;
-  }
   void add (GstPad *pad, GstPadProbeInfo *info)
   {
     const Nanoseconds now = monotonic_now ();
@@ -91,15 +88,13 @@ private:
     const bool is_frame = info->type & GST_PAD_PROBE_TYPE_BUFFER;
     const bool is_end = !is_frame && GST_EVENT_TYPE (GST_PAD_PROBE_INFO_EVENT (
                                          info)) == GST_EVENT_EOS;
-    const gst::CapsPtr caps (gst_pad_get_current_caps (pad));
-    GstVideoInfo video;
-    const bool known = caps && gst_video_info_from_caps (&video, caps.get ());
+    const auto video = video_at (pad);
     const std::lock_guard guard (lock_);
     ended_ |= is_end;
-    if (is_frame && known) {
+    if (is_frame && video) {
       frames_.push_back (
-          {gst::BufferPtr (gst_buffer_ref (buffer)), video, now});
-      while (frames_.size () > 1 + most_ / std::max<gsize> (1, video.size))
+          {gst::BufferPtr (gst_buffer_ref (buffer)), *video, now});
+      while (frames_.size () > 1 + most_ / std::max<gsize> (1, video->size))
         frames_.pop_front ();
     }
     came_.notify_all ();

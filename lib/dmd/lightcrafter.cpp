@@ -67,7 +67,6 @@ private:
   Result<void> begin (std::stop_token stop = {},
       std::chrono::milliseconds patience = kPatience);
   bool park () override;
-  Result<void> connect ();
   Error error (const char *what, const std::string &reason,
       ErrorCode code = ErrorCode::device) const;
   Result<Reply> exchange (const Bytes &packet, std::uint16_t command);
@@ -96,19 +95,12 @@ Lightcrafter::begin (
 {
   cancel_ = std::move (stop_token);
   patience_ = patience;
-  RETURN_IF_ERROR (connect ());
+  if (!stream_) {
+    ASSIGN_OR_RETURN (stream_,
+        with_prefix (TcpStream::connect (host_, port_, patience_, cancel_),
+            info_.name + ": "));
+  }
   stream_->cancel_on (cancel_);
-  return {};
-}
-
-Result<void>
-Lightcrafter::connect ()
-{
-  if (stream_)
-    return {};
-  ASSIGN_OR_RETURN (stream_,
-      with_prefix (TcpStream::connect (host_, port_, patience_, cancel_),
-          info_.name + ": "));
   return {};
 }
 

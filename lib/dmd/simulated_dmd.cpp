@@ -163,10 +163,7 @@ namespace
 
 enum class Failure { none, open, upload, start, restart };
 
-struct Slip {
-  std::int64_t slot = 0;
-  int by = 1;
-};
+using Slip = SimulatedMirrors::Slip;
 
 struct Options {
   std::string mirrors;

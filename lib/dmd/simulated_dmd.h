@@ -114,6 +114,10 @@ public:
     std::shared_ptr<const StillMask> held_;
   };
 
+  struct Slip {
+    std::int64_t slot;
+    int by;
+  };
   /** From slot @p slot on, the masks come @p by slots late (> 0) or early
    * (< 0): a missed or a spurious trigger. Slips add up, in the order of their
    * slots; start () ends those before it. */
@@ -125,11 +129,6 @@ public:
 
 private:
   enum class Motion { parked, armed, stepping };
-  struct Slip {
-    std::int64_t slot;
-    int by;
-  };
-
   struct Seen {
     std::optional<int> mask;
     std::shared_ptr<const StillMask> held;

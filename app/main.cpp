@@ -3,9 +3,6 @@
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
-#include <filesystem>
-#include <fstream>
-#include <map>
 #include <string_view>
 
 #include <CLI/CLI.hpp>

@@ -1,7 +1,5 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure info: what a recording says of itself, without its pixels. */
-#include <cstdio>
-
 #include "base/text.h"
 #include "command.h"
 #include "options/board.h"

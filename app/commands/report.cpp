@@ -2,7 +2,6 @@
 /* codedexposure report: a page with pictures and figures of a recording. */
 #include <algorithm>
 #include <cinttypes>
-#include <cmath>
 
 #include <nlohmann/json.hpp>
 

@@ -2,7 +2,6 @@
 /* An emulated controller that fails on command. */
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 #include <deque>
 #include <map>

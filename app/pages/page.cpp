@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "page.h"
 
-#include <cmath>
 #include <ctime>
 #include <regex>
 

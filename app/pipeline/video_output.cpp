@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "video_output.h"
 
-#include <filesystem>
 #include <regex>
 #include <utility>
 

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "network_frames.h"
 
-#include <memory>
-
 #include <arv.h>
 
 #include "base/try.h"

@@ -2,7 +2,6 @@
 /* DMD boards on the USB. */
 #pragma once
 
-#include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>

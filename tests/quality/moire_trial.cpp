@@ -182,7 +182,7 @@ bound_of (const HomographyFit &fit, std::size_t numbers, const Mapping &truth)
   for (std::size_t i = 0; i < Mapping::kParameters; i++)
     for (std::size_t j = 0; j < Mapping::kParameters; j++)
       covariance[i * Mapping::kParameters + j] =
-          step->covariance[i * HomographyFit::kNumbers + j];
+          step->covariance (Eigen::Index (i), Eigen::Index (j));
   const auto mapping =
       Mapping::make ({kMoireSize, kMoireSize, truth.homography (), covariance});
   return mapping ? stated_by (*mapping) : Deviation{};

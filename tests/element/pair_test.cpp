@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-pair: what becomes a pair, and what is said of the rest. */
+#include <future>
 #include <random>
 
 #include "pair_harness.h"
@@ -320,11 +321,21 @@ TEST (PairLive, AFrameWaitsForItsPartnerAndThenGoesAlone)
   EXPECT_EQ (gst_clock_get_time (GST_CLOCK (clock.get ())), kPeriod + 15 * kMs);
 
   /* The first camera is silent. */
+  std::promise<void> dropped[5];
   for (guint64 k = 2; k < 5; k++) {
-    gst_harness_push (off.get (), numbered (k, k * kPeriod).release ());
+    BufferPtr frame = numbered (k, k * kPeriod);
+    gst_mini_object_weak_ref (
+        GST_MINI_OBJECT (frame.get ()),
+        [] (gpointer of_frame, GstMiniObject *) {
+          static_cast<std::promise<void> *> (of_frame)->set_value ();
+        },
+        &dropped[k]);
+    gst_harness_push (off.get (), frame.release ());
     ASSERT_TRUE (gst_harness_crank_single_clock_wait (pair.get ()));
     EXPECT_EQ (gst_clock_get_time (GST_CLOCK (clock.get ())),
         k * kPeriod + 15 * kMs + GST_SECOND);
+    /* A frame that came before would begin the wait anew. */
+    dropped[k].get_future ().wait ();
   }
   pair.push (numbered (30, 30 * kPeriod));
   gst_harness_push (off.get (), numbered (30, 30 * kPeriod).release ());

@@ -266,7 +266,9 @@ void
 CameraTracks::add_frames (GstPad *pad, const FrameReading &how)
 {
   const CapsPtr caps (gst_pad_query_caps (pad, nullptr));
-  if (!make_decoder (pad, caps.get (), how))
+  /* A stop takes them from the pad. */
+  if (gst_caps_get_size (caps.get ()) == 0 ||
+      !make_decoder (pad, caps.get (), how))
     return;
   duration_ = how.duration;
   if (duration_ > 0)

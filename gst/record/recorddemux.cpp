@@ -122,8 +122,9 @@ bool
 is_text (GstPad *pad)
 {
   const CapsPtr caps (gst_pad_query_caps (pad, nullptr));
-  return gst_structure_has_name (
-      gst_caps_get_structure (caps.get (), 0), "text/x-raw");
+  return gst_caps_get_size (caps.get ()) > 0 &&
+         gst_structure_has_name (
+             gst_caps_get_structure (caps.get (), 0), "text/x-raw");
 }
 
 /* From a track of @pad, as the head of the file says. */

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <future>
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -424,6 +425,47 @@ TEST (RecordDemux, SaysThatItDoesNotReadAnotherVideo)
         !more.empty ())
         << warnings;
   }
+  std::filesystem::remove (path);
+}
+
+/* Takes the caps of a demuxer's pad before others know of it, as a stop of the
+ * pipeline does meanwhile. */
+gboolean
+stop_pad (GSignalInvocationHint *, guint, const GValue *values, gpointer last)
+{
+  auto *element = static_cast<GstElement *> (g_value_get_object (values));
+  auto *pad = static_cast<GstPad *> (g_value_get_object (values + 1));
+  if (G_OBJECT_TYPE_NAME (element) != std::string ("GstMatroskaDemux") ||
+      !GST_PAD_IS_SRC (pad))
+    return TRUE;
+  gst_pad_set_active (pad, FALSE);
+  if (!g_str_has_prefix (GST_OBJECT_NAME (pad), "video_"))
+    static_cast<std::promise<void> *> (last)->set_value ();
+  return TRUE;
+}
+
+TEST (RecordTracks, AreNotReadOnceTheirPadsHaveStopped)
+{
+  const std::string path =
+      "/tmp/record_stop_test_" + std::to_string (getpid ()) + ".mkv";
+  ASSERT_EQ (
+      Pipeline ("videotestsrc num-buffers=5 ! " + gray_caps (64, 48, "100/1") +
+                " ! codedexposure-recordmux ! filesink location=" + path)
+          .play (),
+      "");
+  std::promise<void> last;
+  const guint added = g_signal_lookup ("pad-added", GST_TYPE_ELEMENT);
+  const gulong hook =
+      g_signal_add_emission_hook (added, 0, stop_pad, &last, nullptr);
+  {
+    Pipeline reading ("filesrc location=" + path +
+                      " ! codedexposure-recorddemux name=demux ! fakesink");
+    const ObjectPtr<GstObject> whole (
+        gst_object_get_parent (GST_OBJECT (reading["demux"].get ())));
+    gst_element_set_state (GST_ELEMENT (whole.get ()), GST_STATE_PAUSED);
+    last.get_future ().wait ();
+  }
+  g_signal_remove_emission_hook (added, hook);
   std::filesystem::remove (path);
 }
 

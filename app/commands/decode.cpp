@@ -361,6 +361,10 @@ Decode::run ()
   RunResult result = play_once (false, is_cut_short);
   if (run_.print)
     return result.exit;
+  if (result.container_damaged && times ().is_part ()) {
+    status.line (no_part_text (recording_));
+    return Exit::failed;
+  }
   if (result.container_damaged) {
     status.line (recording_ + " is damaged between its frames; reading it from "
                               "front to back");

@@ -89,6 +89,8 @@ Report::check_end (const RunResult &result)
 {
   if (result.interrupted)
     fail ("stopped; no page was written", Exit::interrupted);
+  if (result.container_damaged)
+    fail (no_part_text (recording_) + "; no page was written");
   if (result.exit == Exit::damaged)
     damaged_ = true;
   else if (result.exit != Exit::done)

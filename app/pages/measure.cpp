@@ -109,8 +109,10 @@ MeasuredStream::add (GstPad *pad, GstBuffer *picture)
 Measurement
 measure (const MeasureOptions &options)
 {
-  Measurement all = measure_once (options, false);
-  return all.result.container_damaged ? measure_once (options, true) : all;
+  Measurement found = measure_once (options, false);
+  return found.result.container_damaged && !options.times.is_part ()
+             ? measure_once (options, true)
+             : found;
 }
 
 } // namespace codedexposure::app

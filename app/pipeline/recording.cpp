@@ -66,6 +66,15 @@ read_recording (Job &job, const std::string &file)
   return chain;
 }
 
+std::string
+no_part_text (const std::string &file)
+{
+  return file +
+         " is damaged between its frames, so that a part of it is not found; "
+         "write its index anew (\"ffmpeg -i IN.mkv -map 0 -c copy OUT.mkv\"), "
+         "or decode all of it";
+}
+
 Chain
 read_sender (Job &job, const std::string &host, int port)
 {

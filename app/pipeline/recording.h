@@ -32,4 +32,8 @@ Chain read_recording (Job &job, const std::string &file);
 /** The same of a sender, over TCP. */
 Chain read_sender (Job &job, const std::string &host, int port);
 
+/** What to do with @p file, of which only all can be read, from front to back:
+ * damage between its frames hides where a part of it is. */
+std::string no_part_text (const std::string &file);
+
 } // namespace codedexposure::app

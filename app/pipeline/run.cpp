@@ -327,8 +327,8 @@ Run::on_error (GstMessage *message)
 namespace
 {
 
-/* Whether frames may follow the last one that was read, behind damage. A part
- * that another program cut out has no last line either. */
+/* Whether frames that are wanted may follow the last one that was read, behind
+ * damage. A part that another program cut out has no last line either. */
 bool
 goes_on (const Job &job, GstMessage *stream_cut)
 {
@@ -337,11 +337,15 @@ goes_on (const Job &job, GstMessage *stream_cut)
     return gst_object_has_as_ancestor (
         GST_MESSAGE_SRC (stream_cut), GST_OBJECT (job.reader));
   };
+  const auto is_wanted = [&] (Nanoseconds pts) {
+    return job.times.holds (GstClockTime (pts - info->start.value_or (0)));
+  };
   /* Those of a second camera end on their own. */
   const auto has_more = [&] {
     return !gst_structure_has_field (
                gst_message_get_structure (stream_cut), "camera") &&
-           info->times.size () > counter_of (job.reader, "frames");
+           std::cmp_greater (std::ranges::count_if (info->times, is_wanted),
+               counter_of (job.reader, "frames"));
   };
   return info && (info->is_damaged ||
                      (job.is_finished && (!is_of_reader () || has_more ())));

@@ -210,11 +210,12 @@ CameraTracks::decode (
   if (caps && gst_caps_can_intersect (caps.get (), grey.get ()))
     return flow;
   POST_ERROR (tracks.element_, CORE, NEGOTIATION,
-      "The FFV1 frames have neither 8 nor 16 bits of grey, as another program "
-      "wrote them. Use the recording itself, or write the pixels in such a "
-      "format (\"ffmpeg -i IN.mkv -map 0 -c:s copy -c:v ffv1 -pix_fmt gray "
-      "OUT.mkv\", or gray16le); frames whose pixels are not those that were "
-      "recorded are flagged.");
+      "The pixels of the FFV1 frames are neither 8 nor 16 bits of grey, which "
+      "those of a recording are: another program has written them anew. Use "
+      "the recording itself, or change the format (\"ffmpeg -i IN.mkv -map 0 "
+      "-c:s copy -c:v ffv1 -pix_fmt gray OUT.mkv\"; with more than 8 bits, "
+      "gray16le). Frames whose pixels are not those that were recorded are "
+      "flagged.");
   return GST_FLOW_FLUSHING;
 }
 

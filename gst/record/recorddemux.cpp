@@ -231,21 +231,21 @@ void
 on_no_more_pads (GstElement *file, gpointer self)
 {
   struct {
-    int all = 0, unread = 0;
-  } videos;
-  const auto count = [] (GstElement *, GstPad *pad, gpointer data) {
-    auto &counted = *static_cast<decltype (videos) *> (data);
+    bool any = false, unread = false;
+  } video;
+  const auto look = [] (GstElement *, GstPad *pad, gpointer data) {
+    auto &found = *static_cast<decltype (video) *> (data);
     const bool is_video = g_str_has_prefix (GST_OBJECT_NAME (pad), "video_");
-    counted.all += is_video;
-    counted.unread += is_video && !gst_pad_is_linked (pad);
+    found.any |= is_video;
+    found.unread |= is_video && !gst_pad_is_linked (pad);
     return gboolean (TRUE);
   };
-  add_partner (as<GstCodedExposureRecordDemux> (self));
-  gst_element_foreach_src_pad (file, count, &videos);
-  if (videos.all == 0)
+  add_partner (as<Self> (self));
+  gst_element_foreach_src_pad (file, look, &video);
+  if (!video.any)
     POST_ERROR (self, STREAM, WRONG_TYPE,
         "The file has no video. Use a recording of coded frames.");
-  else if (videos.unread > 0 && videos.all > 1)
+  else if (video.unread && state_in<Self> (self).coded.has_frames ())
     POST_WARNING (self, STREAM, DEMUX, kOtherVideo);
 }
 

@@ -297,8 +297,8 @@ join_command ()
       .summary = "",
       .usage = "[option...] PART.mkv... --output OUT",
       .description = R"(
-Puts lossless videos of excerpts together, as one run of decode would have written
-them, and prints what they hold as JSON.
+Puts lossless videos of excerpts together, as one run of decode would have
+written them, and prints what they hold as JSON.
 )"});
 }
 

@@ -192,9 +192,8 @@ properties ()
           "DMD to control: usb: or lightcrafter: for a board (docs/dmd.md), "
           "sim:NAME[,key=value...] for a simulated one (docs/timing.md); "
           "external: another program shows the masks, as on a ViALUX board, "
-          "and "
-          "only a pilot can tell whether frames are synchronised; empty: none, "
-          "frames are stamped and watched only; fixed above NULL",
+          "and only a pilot can tell whether frames are synchronised; empty: "
+          "none, frames are stamped and watched only; fixed above NULL",
           kReadWriteNull, set (&Settings::device)},
       {"schedule", "Schedule",
           "Tile, code and timing of the exposure: a preset such as "

@@ -350,8 +350,8 @@ without_colorimetry (GstCaps *caps)
 }
 
 /* FFmpeg 5.1 loses the pixels of FFV1 frames of one row or column, which are
- * kept raw. Caps that tell the muxer, which takes no
- * others, nothing new are dropped. */
+ * kept raw. Caps that tell the muxer, which takes no others, nothing new are
+ * dropped. */
 GstPadProbeReturn
 follow_caps (GstElement *self, GstEvent *event)
 {

@@ -83,12 +83,12 @@ public:
     pad_ = pad;
     gst_pad_set_element_private (pad, static_cast<Derived *> (this));
     gst_pad_set_chain_function (
-        pad, [] (GstPad *self, GstObject *element, GstBuffer *buffer) noexcept {
-          return of (self).chain (element, BufferPtr (buffer));
+        pad, [] (GstPad *own, GstObject *element, GstBuffer *buffer) noexcept {
+          return of (own).chain (element, BufferPtr (buffer));
         });
     gst_pad_set_event_function (
-        pad, [] (GstPad *self, GstObject *, GstEvent *event) noexcept {
-          of (self).follow (EventPtr (event).get ());
+        pad, [] (GstPad *own, GstObject *, GstEvent *event) noexcept {
+          of (own).follow (EventPtr (event).get ());
           return gboolean (TRUE);
         });
   }

@@ -81,9 +81,9 @@ public:
   Result<Finding> run ()
   {
     finding_.notes.emplace_back ("not checked of the second camera",
-        "conversion gain, full well, read noise, linearity and defects, as its "
-        "light cannot be dosed; and off-state leakage, which is in its black "
-        "level");
+        "conversion gain, full well, read noise, linearity, clipped black and "
+        "defects, as its light cannot be dosed; vignetting; and off-state "
+        "leakage, which is in its black level");
     /* What follows from a fault is not judged. */
     for (const auto step : {&SecondRun::look_at_parts, &SecondRun::count_frames,
              &SecondRun::look_for_late_frames, &SecondRun::measure_light,
@@ -345,7 +345,7 @@ private:
     ASSIGN_OR_RETURN (const Both on, look (lit (0, 1), 1, kFrames));
     ASSIGN_OR_RETURN (
         const Stack bright, look_at_light (other_, lit (0, 1), 1, kFrames));
-    const auto &full = bright.full.pixels (); // frames, of each pixel
+    const auto full = bright.full.pixels (); // frames, of each pixel
     const auto pixels = double (full.size ());
     finding_.measure ("second-bright",
         {100 * (pixels - double (std::ranges::count (full, 0))) / pixels, 0.0});

@@ -86,7 +86,7 @@ public:
   const T &at (int x, int y) const { return view ().at (x, y); }
   /** All of them, row by row. */
   std::span<T> pixels () { return pixels_; }
-  const std::vector<T> &pixels () const { return pixels_; }
+  std::span<const T> pixels () const { return pixels_; }
 
   bool operator== (const Image &) const = default;
 

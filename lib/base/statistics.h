@@ -60,6 +60,15 @@ quantile (std::vector<T> values, double part)
   return *at;
 }
 
+/** The same of the pixels of @p picture. */
+template <typename T>
+T
+quantile (const Image<T> &picture, double part)
+{
+  const auto all = picture.pixels ();
+  return quantile (std::vector<T> (all.begin (), all.end ()), part);
+}
+
 template <typename T>
 T
 median (std::vector<T> values)

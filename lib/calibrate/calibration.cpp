@@ -333,8 +333,8 @@ Calibration::gratings (Axis axis) const
 Result<Image<std::uint8_t>>
 Calibration::usable_pixels (CalibrationResult &result) const
 {
-  const float covered = std::max (1.0f,
-      kCovered * quantile (std::as_const (result.contrast).pixels (), 0.9));
+  const float covered =
+      std::max (1.0f, kCovered * quantile (result.contrast, 0.9));
   Image<std::uint8_t> usable (camera_.width, camera_.height);
   each_pixel (usable, [&] (int x, int y) {
     PixelQuality &quality = result.quality.at (x, y);

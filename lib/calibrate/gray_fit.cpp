@@ -64,9 +64,7 @@ fit_gray_codes (const GrayCode &gx, const GrayCode &gy,
   Homography h = {0, 0, 0, 0, 0, 0, 0, 0, 1};
   const double stripe = std::max (gx.width, gy.width);
   /* The limit for outliers shrinks to 1.5 stripes, as half a stripe is the
-   * error of the code itself; the first affine mapping is that through all
-   * samples.
-   */
+   * error of the code itself; the first mapping is affine, of all samples. */
   double limit = 1e9;
   std::size_t agree = 0;
   for (int round = 0; round <= 12; round++) {

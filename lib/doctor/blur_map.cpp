@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <complex>
+#include <iterator>
 #include <numbers>
 
 #include "base/statistics.h"
@@ -186,8 +187,9 @@ variance_of (const BlockPowers &seen, const std::vector<Expected> &entries)
 double
 BlurMap::median () const
 {
-  std::vector<float> known = variance.pixels ();
-  std::erase_if (known, [] (float value) { return !(value >= 0.0f); });
+  std::vector<float> known;
+  std::ranges::copy_if (variance.pixels (), std::back_inserter (known),
+      [] (float value) { return value >= 0.0f; });
   return std::sqrt (double (codedexposure::median (std::move (known))));
 }
 

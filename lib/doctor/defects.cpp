@@ -97,7 +97,7 @@ public:
 
   Defects run ()
   {
-    bright_ = quantile (std::as_const (field_).pixels (), 0.9);
+    bright_ = quantile (field_, 0.9);
     const float least =
         std::max (float (kCovered) * bright_, 0.005f * float (largest_));
     each_pixel (off_,

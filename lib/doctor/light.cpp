@@ -85,7 +85,7 @@ private:
         full += double (all.full.at (x, y)) / all.frames;
     });
     const double pixels = double (all.mean.pixels ().size ());
-    const double peak = double (quantile (all.mean.pixels (), kPeak));
+    const double peak = double (quantile (all.mean, kPeak));
     const double black = mean_of (dark.mean.view ());
     const Measured level{
         100.0 * (peak - black) / std::max (1.0, largest - black), 0.0};

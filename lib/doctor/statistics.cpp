@@ -248,7 +248,7 @@ corner_loss (ImageView<const float> picture)
 {
   const Image<float> blocks = medians_of (picture,
       std::min (kColumns, picture.width), std::min (kRows, picture.height));
-  const float dark = float (kNoMirrors) * quantile (blocks.pixels (), kBright);
+  const float dark = float (kNoMirrors) * quantile (blocks, kBright);
   MatrixXd a (Index (blocks.pixels ().size ()), 7);
   VectorXd b (a.rows ()), weights = VectorXd::Ones (a.rows ());
   each_pixel (blocks, [&] (int i, int j) {

@@ -64,11 +64,19 @@ CodedFilter::sink_event (EventPtr event)
   }
 }
 
-/* Forwards the events that waited for the caps, or drops them if there were no
- * caps. */
+/* Forwards the events that waited for the caps. If there were none, the stream
+ * ends with its tags and with what is not sticky; the segment and others may
+ * come only once, and still hold for the stream that follows. */
 void
 CodedFilter::settle_events ()
 {
+  if (!has_format ()) {
+    std::erase_if (stream_.pending, [] (const EventPtr &waiting) {
+      return !has_flag (waiting, GST_EVENT_TYPE_STICKY) ||
+             GST_EVENT_TYPE (waiting.get ()) == GST_EVENT_TAG;
+    });
+    return;
+  }
   if (stream_.excerpt)
     stream_.excerpt->begun = true;
   for (EventPtr &event : std::exchange (stream_.pending, {})) {
@@ -77,8 +85,7 @@ CodedFilter::settle_events ()
     if (GST_EVENT_TYPE (event.get ()) == GST_EVENT_TAG &&
         takes_provenance (event.get ()))
       stream_.provenance_due = false;
-    if (has_format ())
-      forward (std::move (event));
+    forward (std::move (event));
   }
 }
 

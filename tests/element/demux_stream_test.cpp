@@ -164,6 +164,21 @@ TEST_F (DemuxStream, StreamWithoutCapsEndsAndTheNextOneIsPlayed)
   EXPECT_EQ (pull_all ().size (), 4u);
 }
 
+/* As upstream sends its sticky events again, but not the segment. */
+TEST_F (DemuxStream, SegmentBeforeTheStreamStartHoldsForItsFrames)
+{
+  start ();
+  push_segment (1.0, 3 * GST_SECOND, 9 * GST_SECOND);
+  demux->push_event (gst_event_new_stream_start ("again"));
+  push (3 * GST_SECOND);
+  EXPECT_EQ (discont_times (), (std::vector<int>{-3000, 3010, 3020, 3030}));
+  const EventPtr event = demux->pull_event (GST_EVENT_SEGMENT);
+  ASSERT_TRUE (event);
+  const GstSegment *segment = nullptr;
+  gst_event_parse_segment (event.get (), &segment);
+  EXPECT_EQ (segment->start, 3 * GST_SECOND);
+}
+
 TEST_F (DemuxStream, SecondRunKnowsNothingOfTheFirst)
 {
   start ();

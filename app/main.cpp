@@ -233,6 +233,8 @@ main (int argc, char **argv)
   using namespace codedexposure;
   /* It is for windows, and no other run may end because of it. */
   std::signal (SIGUSR1, SIG_IGN);
+  /* A file that may grow no longer is an error, as a full disk is. */
+  std::signal (SIGXFSZ, SIG_IGN);
   std::string name;
   auto words = app::words_of (argc, argv, name);
   int code = app::run (int (words.size ()), words.data ());

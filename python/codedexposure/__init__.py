@@ -33,7 +33,9 @@ def __getattr__(name):
     return getattr(importlib.import_module("." + _ROOMS[name], __name__), name)
 
 
+def __dir__():
+    return sorted({*globals(), *__all__})
+
+
 __version__ = "0.2.0"
-__all__ = ["Camera", "Error", "Frame", "Frames", "Recording",
-           "RecordingWarning", "UncountableError", "camera", "decode_array",
-           "fuse_array", "open", "simulate"]
+__all__ = sorted(_ROOMS)

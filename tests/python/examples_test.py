@@ -32,6 +32,12 @@ def tearDownModule():
     clean()
 
 
+class Names(unittest.TestCase):
+    def test_completion_offers_them(self):
+        self.assertLessEqual(set(codedexposure.__all__), set(dir(codedexposure)))
+        self.assertIn("open", codedexposure.__all__)
+
+
 class Examples(unittest.TestCase):
     def setUp(self):
         # matplotlib brings 100 MB of packages; what is tested is what it gets.

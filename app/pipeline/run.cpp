@@ -319,6 +319,8 @@ Run::on_error (GstMessage *message)
   if (recording_ && recording_->has (source)) {
     status_.line ("the recording ends here; the window goes on");
     recording_->remove ();
+    if (playing_)
+      set_playing ();
     return;
   }
   end_after_error (source);

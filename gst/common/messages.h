@@ -38,8 +38,8 @@ struct Saturated {
 struct PartnerLost {
   static constexpr const char *kName = "codedexposure/partner-lost";
   bool active = false; ///< it begins
-  /** Of the first: "missing", "damaged", one of the two, or "other-exposure",
-   * by the pixels. */
+  /** Of the first: "missing", "damaged", one of the two, "other-schedule", as
+   * the streams say, or "other-exposure", by the pixels. */
   std::string reason;
   std::optional<guint64> frames = {}; ///< at the end: how many there were
   GstClockTime from = 0;

@@ -42,6 +42,16 @@ camera_of (const PairStream &stream, const std::optional<Mapping> &mapping)
   return camera;
 }
 
+/* Times and leak are of no account. */
+bool
+have_same_masks (const Schedule &one, const Schedule &other)
+{
+  return one.tile () == other.tile () && one.code () == other.code () &&
+         one.order () == other.order () && one.phase () == other.phase () &&
+         one.pilot_rows () == other.pilot_rows () &&
+         one.regions () == other.regions ();
+}
+
 GreyView
 grey_view (MappedFrame &mapped)
 {
@@ -57,6 +67,8 @@ PairCheck::configure (const PairStream &on, const PairStream &off)
   drift_.reset ();
   on_ = on.info;
   off_ = off.info;
+  are_masks_alike_ = !on.setup || !off.setup ||
+                     have_same_masks (on.setup->schedule, off.setup->schedule);
   const auto mapping_of = [] (const PairStream &stream) {
     return stream.setup ? stream.setup->known_mapping () : std::nullopt;
   };

@@ -17,9 +17,10 @@
  * of each other: by the start that the metadata of both say, else by running
  * time. Arrival and numbers do not count. A coded frame without a partner
  * passes alone, as it came. So does one that is corrupted, or whose partner is.
- * A frame of the second camera without a coded frame is dropped. Both cameras
- * must have the same pixel format, with the same number of significant bits;
- * their sizes may differ.
+ * A frame of the second camera without a coded frame is dropped, and so is one
+ * with another schedule, which is a warning. Both cameras must have the same
+ * pixel format, with the same number of significant bits; their sizes may
+ * differ.
  *
  * Time stamps can be wrong by a frame. The sum of both beams has the light of
  * the whole exposure and shows no masks; that of different exposures shows them
@@ -61,8 +62,8 @@
  * The message `codedexposure/partner-lost` is posted when coded frames begin to
  * go on alone (`active` TRUE, `reason`, `from`) and when they have partners
  * again (`frames` how many were alone, `reason` of the first, `from`, `to`, at
- * the end of the stream the last of them). The reason is `missing`, `damaged`
- * or `other-exposure`. #codedexposure-pair:frames-paired,
+ * the end of the stream the last of them). The reason is `missing`, `damaged`,
+ * `other-schedule` or `other-exposure`. #codedexposure-pair:frames-paired,
  * #codedexposure-pair:pairs-confirmed, #codedexposure-pair:frames-alone,
  * #codedexposure-pair:pairs-refused and #codedexposure-pair:partners-dropped
  * count, and can be read until the next run starts.
@@ -200,6 +201,21 @@ watch_drift (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
   locked (self, [&] { st.shift = st.drift.median ().value_or (kUnknown); });
 }
 
+/* Once in a run: streams whose schedules change may do so one after the other.
+ */
+void
+warn_of_masks (GstCodedExposurePair *self)
+{
+  PairState &st = state (self);
+  if (!std::exchange (st.masks_said, true))
+    POST_WARNING (self, STREAM, FAILED,
+        "The frames of the first camera have the schedule " +
+            st.on.setup->schedule.text () + ", and those of the second " +
+            st.off.setup->schedule.text () +
+            "; coded frames go on alone. Both cameras see the same masks: give "
+            "both the same schedule.");
+}
+
 Judgement
 judge (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
 {
@@ -213,6 +229,10 @@ judge (GstCodedExposurePair *self, GstBuffer *coded, GstBuffer *partner)
   if (shows_pattern (coded) || shows_pattern (partner)) {
     state (self).check.reset ();
     return {};
+  }
+  if (!check_of (self).are_masks_alike ()) {
+    warn_of_masks (self);
+    return {"other-schedule"};
   }
   const Verdict verdict = check_of (self).check (coded, partner);
   if (verdict == Verdict::bad)

@@ -37,6 +37,8 @@ public:
   /** With streams whose frames cannot be compared, since no tag says how they
    * lie on the mirrors, no verdict will be known. */
   void configure (const PairStream &on, const PairStream &off);
+  /** False if both streams say which masks they saw, and these differ. */
+  bool are_masks_alike () const { return are_masks_alike_; }
   /** The next pair has none before it. */
   void reset ();
   /** Buffers that cannot be read are not known. */
@@ -51,6 +53,7 @@ private:
   std::optional<PartnerWatch> watch_;
   std::optional<PartnerDrift> drift_; ///< none: masks are not of one period
   GstVideoInfo on_ = {}, off_ = {};
+  bool are_masks_alike_ = true;
 };
 
 /** Says when the second camera has moved. */
@@ -90,10 +93,11 @@ struct Run {
   /** A frame has pushed caps and segment of the base class, so that a gap need
    * not wait for one. */
   bool has_begun = false;
-  bool has_ended = false; ///< the next frame is none
-  bool check_due = false; ///< a stream is another
-  bool refused = false;   ///< an error was posted
-  bool is_silent = false; ///< no coded frame is there to be late for
+  bool has_ended = false;  ///< the next frame is none
+  bool check_due = false;  ///< a stream is another
+  bool refused = false;    ///< an error was posted
+  bool masks_said = false; ///< that they differ
+  bool is_silent = false;  ///< no coded frame is there to be late for
   PairCheck check;
   AloneFrames alone;
   guint64 refused_in_a_row = 0;

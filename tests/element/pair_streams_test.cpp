@@ -203,6 +203,34 @@ TEST_F (Pair, SoAreThoseWhoseFramesSayTheirBits)
       "pixel format.");
 }
 
+/* Fusion takes what the second camera saw for the complement of the masks of
+ * the first. */
+TEST_F (Pair, CamerasOfDifferentSchedulesMakeNoPairs)
+{
+  push_setup (pair.get (), {.schedule = schedule_of (kPreset)});
+  push_setup (off.get (),
+      {.schedule = schedule_of ("sequential:lattice:8/3"), .off_beam = true});
+  EXPECT_EQ (run (frames ({0, 1}), frames ({0, 1})),
+      (Numbers{{0, kAlone}, {1, kAlone}}));
+  EXPECT_EQ (pair.warning (),
+      "The frames of the first camera have the schedule " +
+          std::string (kPreset) +
+          ", and those of the second sequential:lattice:8/3; coded frames go "
+          "on alone. Both cameras see the same masks: give both the same "
+          "schedule.");
+}
+
+/* Of the masks, not of what each profile and camera says. */
+TEST_F (Pair, TimesAndLeakOfTheirSchedulesMayDiffer)
+{
+  push_setup (pair.get (), {.schedule = schedule_of (kPreset)});
+  push_setup (
+      off.get (), {.schedule = schedule_of (
+                       std::string (kPreset) + ",leak=0.01,switching=0.2ms"),
+                      .off_beam = true});
+  EXPECT_EQ (run (frames ({0, 1}), frames ({0, 1})), (Numbers{{0, 0}, {1, 1}}));
+}
+
 TEST_F (Pair, TheSizesOfBothCamerasMayDiffer)
 {
   gst_harness_set_src_caps_str (

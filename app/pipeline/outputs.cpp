@@ -255,6 +255,11 @@ Outputs::check (GstElement *pipeline) const
             written + " is written twice; give each output its own name"};
   }
   for (const auto &output : outputs_)
+    if (const std::string part = output->name () + ".part";
+        places.contains (place_of (part)))
+      return Error{part + " is where " + output->name () +
+                   " is written until it is complete; use another name"};
+  for (const auto &output : outputs_)
     for (const fs::path &place : places)
       if (output->kind.folder_with &&
           lies_in (place, place_of (output->name ())))

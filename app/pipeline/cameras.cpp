@@ -24,7 +24,7 @@ cameras_found ()
   const std::string names = joined (found);
   return names.empty () ? "no camera was found; check its power and its network"
                         : "the cameras that were found are " + names +
-                              "; set --camera to one of them";
+                              "; give the name of one of them";
 }
 
 std::optional<std::string>

@@ -42,10 +42,10 @@ Run::say_no_frame ()
                 ? format (", from %g s on; check whether that is after its end",
                       double (*job_.times.start) / double (GST_SECOND))
                 : ""));
-  else if (!interrupted_)
-    status_.line ("error: no coded frame arrived");
-  else if (exit_ != Exit::interrupted)
+  else if (interrupted_ && exit_ != Exit::interrupted)
     status_.line ("stopped before the first coded frame");
+  else if (!interrupted_ && !failed_) // else the error says why
+    status_.line ("error: no coded frame arrived");
 }
 
 /* A recording gets its name however it ends; other results only if they are

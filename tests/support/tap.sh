@@ -73,6 +73,18 @@ check_said ()
   fi
 }
 
+# check_unsaid NAME REGEX: and did not say this. "$said" is empty while check and
+# check_status run their command, so a grep there finds nothing.
+check_unsaid ()
+{
+  if grep -qE -e "$2" "$said"; then
+    verdict 'not ok' "$1"
+    sed 's/^/# /' "$said"
+  else
+    verdict ok "$1"
+  fi
+}
+
 skip ()
 {
   verdict ok "$1 # SKIP $2"

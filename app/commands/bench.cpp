@@ -34,8 +34,90 @@ namespace
 class Bench
 {
 public:
-  void declare (Options &options);
-  Exit run ();
+  void declare (Options &options)
+  {
+    options.rest (command_);
+    options.heading ("");
+    options.value ("--cameras", cameras_, "N",
+        "number of cameras, at 127.0.0.1, 127.0.0.2 ... [1]", whole (1, 9));
+    options.flag ("--second", second_,
+        "also a camera in the beam of the mirrors that are off, at 127.0.0.2, "
+        "which sees the same scene and is triggered with the first");
+    options.value ("--drift", drift_, "PPM",
+        "how much the clock of the camera is fast [0]",
+        real (-500, 500, "a number of ppm from -500 to 500"));
+    options.value ("--jitter", jitter_, "TIME",
+        "max random delay of frames, such as 5ms [0]", time_rule ("5ms"));
+    options.value ("--packet-loss", packet_loss_, "P",
+        "part of the network packets that is lost, 0 to 1 [0]",
+        real (0, 1, "a number from 0 to 1"));
+    options.value ("--trigger-rate", trigger_rate_, "R",
+        "rate of the DMD's trigger, frames/s [that of the camera]",
+        real (0.1, 1000, "a number of frames/s from 0.1 to 1000"));
+    options.value ("--dmd", dmd_, "BOARD",
+        "the camera sees a DMD in place of a scene: dlp6500 or dlp5500, at "
+        "usb: of COMMAND, in even light",
+        one_of ({"dlp6500", "dlp5500"}));
+    options.value ("--faults", faults_, "\"...\"",
+        "faults of frames: lose@10:3 incomplete@20 delay@30:5ms duplicate@40 "
+        "late@50 stop@60; with --dmd also those of the bench, which --faults "
+        "help lists");
+    options.flag (
+        "--no-outputs", no_outputs_, "no line of the camera can be an output");
+    options.value ("--address", address_, "ADDRESS",
+        "in place of COMMAND: the camera is at this address of the present "
+        "network, until Ctrl-C; reads more faults, such as lose@now:3, from "
+        "standard input");
+    options.flag ("--log", log_,
+        "print a line of JSON for every frame that a camera sends");
+    source_.declare (options, SourceOptions::Kind::simulated);
+    /* The bench of --dmd has light in place of a scene, and its numbers in
+     * --faults. */
+    options.exclude (
+        {"--input", "--input-rate", "--scene", "--pattern", "--schedule",
+            "--bench", "--psf-sigma", "--full-well", "--read-noise", "--gain",
+            "--shift-x", "--shift-y", "--rotation", "--scale", "--frames",
+            "--trigger-rate", "--cameras", "--address"},
+        "--dmd");
+    options.exclude ({"--cameras", "--second"}, "--address");
+    options.exclude ({"--cameras"}, "--second");
+  }
+
+  /* The namespace is made, and signals are blocked, before there are
+   * threads. */
+  Exit run ()
+  {
+    if (faults_ == "help") {
+      std::printf (
+          "Faults of the bench, with --dmd:\n%s", fault_help ().c_str ());
+      return Exit::done;
+    }
+    check ();
+    name_this_program ();
+    sigset_t signals, before;
+    sigemptyset (&signals);
+    for (const int number : {SIGCHLD, SIGINT, SIGTERM, SIGHUP})
+      sigaddset (&signals, number);
+    sigprocmask (SIG_BLOCK, &signals, &before);
+    if (!address_)
+      value_of (leave_network (second_ ? 2 : cameras_.value_or (1)));
+    start_gstreamer ();
+    plan_ = SourcePlan::make (source_);
+    const int cameras = second_ ? 2 : cameras_.value_or (1);
+    if (second_ && !dmd_)
+      trigger_ = std::make_unique<SharedTrigger> (
+          std::llround (1e9 / camera_options (1).trigger_rate));
+    if (dmd_)
+      open_board ();
+    else
+      for (int number = 1; number <= cameras; number++)
+        open_camera (number);
+    if (address_) {
+      sigdelset (&signals, SIGCHLD); // of what looks for plugins
+      return serve_until_end (signals);
+    }
+    return Exit (run_command (signals, before));
+  }
 
 private:
   /** A camera, and the scene that it sees. */
@@ -46,15 +128,163 @@ private:
     std::unique_ptr<GigeCamera> camera;
   };
 
-  void check () const;
-  GigeCameraOptions camera_options (int number) const;
-  void open_camera (int number);
-  void open_board ();
-  void say_serving (const GigeCameraOptions &options);
-  void read_faults (GigeCamera &camera);
-  Exit serve_until_end (const sigset_t &ends);
-  int run_command (const sigset_t &signals, const sigset_t &before) const;
-  std::vector<std::string> words () const;
+  void check () const
+  {
+    if (dmd_ && command_.empty ())
+      usage_error ("--dmd needs a COMMAND");
+    if (address_ && !command_.empty ())
+      usage_error ("--address serves until Ctrl-C; leave out the COMMAND");
+  }
+
+  GigeCameraOptions camera_options (int number) const
+  {
+    GigeCameraOptions options;
+    options.address = address_.value_or ("127.0.0." + std::to_string (number));
+    options.serial = "CE0" + std::to_string (number);
+    options.width = plan_.size.width;
+    options.height = plan_.size.height;
+    options.bits = plan_.bits;
+    options.trigger_rate = trigger_rate_.value_or (
+        double (plan_.frame_rate.num) / plan_.frame_rate.den);
+    options.drift = drift_.value_or (0);
+    options.jitter = jitter_.value_or (0);
+    options.packet_loss = packet_loss_.value_or (0);
+    options.seed = source_.seed.value_or (options.seed);
+    options.outputs = !no_outputs_;
+    options.set_up = [address = options.address] (
+                         const CameraSettings &settings) {
+      std::fprintf (stderr, "bench: %s: the camera sends %s\n",
+          address.c_str (), camera_settings_text (settings).c_str ());
+    };
+    if (log_)
+      options.sent = [address = options.address] (
+                         const SentFrame &sent) { print_sent (address, sent); };
+    return options;
+  }
+
+  void open_camera (int number)
+  {
+    GigeCameraOptions options = camera_options (number);
+    value_of (options.faults.add (faults_.value_or ("")), Exit::usage);
+    Camera &opened = open_.emplace_back ();
+    opened.job = std::make_unique<Job> ("bench", RunOptions{});
+    SourceOptions source = source_;
+    Settings beam;
+    if (second_ && number == 2) {
+      beam = {{"beam", "off"}};
+      source.seed = 1 + source.seed.value_or (0);
+    }
+    Chain chain = simulation (*opened.job, source, plan_, Pace::fast, beam);
+    limit_frames (*opened.job, source_, chain);
+    const bool loop = !source_.frames && source_.input;
+    opened.frames = value_of (FrameSource::open (chain, loop));
+    FrameSource &frames = *opened.frames;
+    options.width = frames.info ().width;
+    options.height = frames.info ().height;
+    if (second_) {
+      opened.triggered = std::make_unique<TriggeredCamera> (*trigger_, frames);
+      options.shoot = [camera = opened.triggered.get ()] (
+                          ImageView<std::uint16_t> picture) {
+        return camera->shoot (picture);
+      };
+    }
+    opened.camera = value_of (GigeCamera::open (
+        options, [&frames] (std::uint64_t, ImageView<std::uint16_t> picture) {
+          return frames.take (picture);
+        }));
+    say_serving (options);
+  }
+
+  void open_board ()
+  {
+    std::vector<GigeCameraOptions> cameras = {camera_options (1)};
+    if (second_)
+      cameras.push_back (camera_options (2));
+    served_ = value_of (ServedBench::open (
+        *dmd_, faults_.value_or (""), plan_.size, std::move (cameras)));
+    for (const GigeCameraOptions &options : served_->camera_options ())
+      say_serving (options);
+  }
+
+  void say_serving (const GigeCameraOptions &options)
+  {
+    status_.line ("serving " + size_text ({options.width, options.height}) +
+                  " as Aravis-Fake-" + options.serial + " at " +
+                  options.address);
+  }
+
+  /* Adds faults from standard input; the thread ends with the process. */
+  void read_faults (GigeCamera &camera)
+  {
+    std::thread ([this, &camera] {
+      for (std::string line; std::getline (std::cin, line);)
+        if (const auto added = camera.add_faults (line); !added)
+          status_.line (added.error ().message);
+    }).detach ();
+  }
+
+  /* The camera is a real one for others until a signal, or until its scene
+   * ends. */
+  Exit serve_until_end (const sigset_t &ends)
+  {
+    read_faults (*open_.front ().camera);
+    const FrameSource &frames = *open_.front ().frames;
+    const timespec moment{0, 100'000'000};
+    while (!frames.ended () && sigtimedwait (&ends, nullptr, &moment) < 0)
+      ;
+    if (frames.ended ())
+      status_.line (frames.why_ended ());
+    return Exit::done;
+  }
+
+  /* A terminal sends its signals to both, and the camera must not end before
+   * the command that reads it; other signals are passed on. */
+  int run_command (const sigset_t &signals, const sigset_t &before) const
+  {
+    const std::vector<std::string> words = this->words ();
+    std::vector<char *> arguments;
+    for (const std::string &word : words)
+      arguments.push_back (const_cast<char *> (word.c_str ()));
+    arguments.push_back (nullptr);
+    const pid_t child = fork ();
+    if (child < 0)
+      fail ("cannot start " + words[0] + "; end other programs");
+    if (child == 0) {
+      prctl (PR_SET_PDEATHSIG, SIGTERM);
+      sigprocmask (SIG_SETMASK, &before, nullptr);
+      if (served_)
+        for (const auto &[name, value] : served_->environment ())
+          setenv (name.c_str (), value.c_str (), 1);
+      execvp (arguments[0], arguments.data ());
+      std::fprintf (stderr, "bench: cannot run %s: %s\n", arguments[0],
+          std::strerror (errno));
+      _exit (127);
+    }
+    int status = 0;
+    while (waitpid (child, &status, WNOHANG) == 0) {
+      siginfo_t info = {};
+      const int number = sigwaitinfo (&signals, &info);
+      const bool from_terminal = info.si_code == SI_KERNEL;
+      if (number > 0 && number != SIGCHLD && !from_terminal)
+        kill (child, number);
+    }
+    return WIFSIGNALED (status) ? 128 + WTERMSIG (status)
+                                : WEXITSTATUS (status);
+  }
+
+  std::vector<std::string> words () const
+  {
+    if (!command_.empty ())
+      return command_;
+    std::vector<std::string> live{"/proc/self/exe", "live", "--camera",
+        "127.0.0.1", "--size", size_text (plan_.size), "--frame-rate",
+        rate_text (plan_.frame_rate), "--pixel-format",
+        plan_.bits > 8 ? "Mono16" : "Mono8", "--schedule",
+        source_.schedule_text ()};
+    if (second_)
+      live.insert (live.end (), {"--second", "--second-camera", "127.0.0.2"});
+    return live;
+  }
 
   SourceOptions source_;
   SourcePlan plan_;
@@ -69,257 +299,6 @@ private:
   std::vector<Camera> open_;
   std::unique_ptr<ServedBench> served_;
 };
-
-void
-Bench::declare (Options &options)
-{
-  options.rest (command_);
-  options.heading ("");
-  options.value ("--cameras", cameras_, "N",
-      "number of cameras, at 127.0.0.1, 127.0.0.2 ... [1]", whole (1, 9));
-  options.flag ("--second", second_,
-      "also a camera in the beam of the mirrors that are off, at 127.0.0.2, "
-      "which sees the same scene and is triggered with the first");
-  options.value ("--drift", drift_, "PPM",
-      "how much the clock of the camera is fast [0]",
-      real (-500, 500, "a number of ppm from -500 to 500"));
-  options.value ("--jitter", jitter_, "TIME",
-      "max random delay of frames, such as 5ms [0]", time_rule ("5ms"));
-  options.value ("--packet-loss", packet_loss_, "P",
-      "part of the network packets that is lost, 0 to 1 [0]",
-      real (0, 1, "a number from 0 to 1"));
-  options.value ("--trigger-rate", trigger_rate_, "R",
-      "rate of the DMD's trigger, frames/s [that of the camera]",
-      real (0.1, 1000, "a number of frames/s from 0.1 to 1000"));
-  options.value ("--dmd", dmd_, "BOARD",
-      "the camera sees a DMD in place of a scene: dlp6500 or dlp5500, at usb: "
-      "of COMMAND, in even light",
-      one_of ({"dlp6500", "dlp5500"}));
-  options.value ("--faults", faults_, "\"...\"",
-      "faults of frames: lose@10:3 incomplete@20 delay@30:5ms duplicate@40 "
-      "late@50 stop@60; with --dmd also those of the bench, which --faults "
-      "help lists");
-  options.flag (
-      "--no-outputs", no_outputs_, "no line of the camera can be an output");
-  options.value ("--address", address_, "ADDRESS",
-      "in place of COMMAND: the camera is at this address of the present "
-      "network, until Ctrl-C; reads more faults, such as lose@now:3, from "
-      "standard input");
-  options.flag ("--log", log_,
-      "print a line of JSON for every frame that a camera sends");
-  source_.declare (options, SourceOptions::Kind::simulated);
-  /* The bench of --dmd has light in place of a scene, and its numbers in
-   * --faults. */
-  options.exclude (
-      {"--input", "--input-rate", "--scene", "--pattern", "--schedule",
-          "--bench", "--psf-sigma", "--full-well", "--read-noise", "--gain",
-          "--shift-x", "--shift-y", "--rotation", "--scale", "--frames",
-          "--trigger-rate", "--cameras", "--address"},
-      "--dmd");
-  options.exclude ({"--cameras", "--second"}, "--address");
-  options.exclude ({"--cameras"}, "--second");
-}
-
-void
-Bench::check () const
-{
-  if (dmd_ && command_.empty ())
-    usage_error ("--dmd needs a COMMAND");
-  if (address_ && !command_.empty ())
-    usage_error ("--address serves until Ctrl-C; leave out the COMMAND");
-}
-
-GigeCameraOptions
-Bench::camera_options (int number) const
-{
-  GigeCameraOptions options;
-  options.address = address_.value_or ("127.0.0." + std::to_string (number));
-  options.serial = "CE0" + std::to_string (number);
-  options.width = plan_.size.width;
-  options.height = plan_.size.height;
-  options.bits = plan_.bits;
-  options.trigger_rate = trigger_rate_.value_or (
-      double (plan_.frame_rate.num) / plan_.frame_rate.den);
-  options.drift = drift_.value_or (0);
-  options.jitter = jitter_.value_or (0);
-  options.packet_loss = packet_loss_.value_or (0);
-  options.seed = source_.seed.value_or (options.seed);
-  options.outputs = !no_outputs_;
-  options.set_up = [address = options.address] (
-                       const CameraSettings &settings) {
-    std::fprintf (stderr, "bench: %s: the camera sends %s\n", address.c_str (),
-        camera_settings_text (settings).c_str ());
-  };
-  if (log_)
-    options.sent = [address = options.address] (
-                       const SentFrame &sent) { print_sent (address, sent); };
-  return options;
-}
-
-void
-Bench::say_serving (const GigeCameraOptions &options)
-{
-  status_.line ("serving " + size_text ({options.width, options.height}) +
-                " as Aravis-Fake-" + options.serial + " at " + options.address);
-}
-
-/* Adds faults from standard input; the thread ends with the process. */
-void
-Bench::read_faults (GigeCamera &camera)
-{
-  std::thread ([this, &camera] {
-    for (std::string line; std::getline (std::cin, line);)
-      if (const auto added = camera.add_faults (line); !added)
-        status_.line (added.error ().message);
-  }).detach ();
-}
-
-void
-Bench::open_camera (int number)
-{
-  GigeCameraOptions options = camera_options (number);
-  value_of (options.faults.add (faults_.value_or ("")), Exit::usage);
-  Camera &opened = open_.emplace_back ();
-  opened.job = std::make_unique<Job> ("bench", RunOptions{});
-  SourceOptions source = source_;
-  Settings beam;
-  if (second_ && number == 2) {
-    beam = {{"beam", "off"}};
-    source.seed = 1 + source.seed.value_or (0);
-  }
-  Chain chain = simulation (*opened.job, source, plan_, Pace::fast, beam);
-  limit_frames (*opened.job, source_, chain);
-  const bool loop = !source_.frames && source_.input;
-  opened.frames = value_of (FrameSource::open (chain, loop));
-  FrameSource &frames = *opened.frames;
-  options.width = frames.info ().width;
-  options.height = frames.info ().height;
-  if (second_) {
-    opened.triggered = std::make_unique<TriggeredCamera> (*trigger_, frames);
-    options.shoot = [camera = opened.triggered.get ()] (
-                        ImageView<std::uint16_t> picture) {
-      return camera->shoot (picture);
-    };
-  }
-  opened.camera = value_of (GigeCamera::open (
-      options, [&frames] (std::uint64_t, ImageView<std::uint16_t> picture) {
-        return frames.take (picture);
-      }));
-  say_serving (options);
-}
-
-void
-Bench::open_board ()
-{
-  std::vector<GigeCameraOptions> cameras = {camera_options (1)};
-  if (second_)
-    cameras.push_back (camera_options (2));
-  served_ = value_of (ServedBench::open (
-      *dmd_, faults_.value_or (""), plan_.size, std::move (cameras)));
-  for (const GigeCameraOptions &options : served_->camera_options ())
-    say_serving (options);
-}
-
-/* The camera is a real one for others until a signal, or until its scene ends.
- */
-Exit
-Bench::serve_until_end (const sigset_t &ends)
-{
-  read_faults (*open_.front ().camera);
-  const FrameSource &frames = *open_.front ().frames;
-  const timespec moment{0, 100'000'000};
-  while (!frames.ended () && sigtimedwait (&ends, nullptr, &moment) < 0)
-    ;
-  if (frames.ended ())
-    status_.line (frames.why_ended ());
-  return Exit::done;
-}
-
-std::vector<std::string>
-Bench::words () const
-{
-  if (!command_.empty ())
-    return command_;
-  std::vector<std::string> live{"/proc/self/exe", "live", "--camera",
-      "127.0.0.1", "--size", size_text (plan_.size), "--frame-rate",
-      rate_text (plan_.frame_rate), "--pixel-format",
-      plan_.bits > 8 ? "Mono16" : "Mono8", "--schedule",
-      source_.schedule_text ()};
-  if (second_)
-    live.insert (live.end (), {"--second", "--second-camera", "127.0.0.2"});
-  return live;
-}
-
-/* A terminal sends its signals to both, and the camera must not end before the
- * command that reads it; other signals are passed on. */
-int
-Bench::run_command (const sigset_t &signals, const sigset_t &before) const
-{
-  const std::vector<std::string> words = this->words ();
-  std::vector<char *> arguments;
-  for (const std::string &word : words)
-    arguments.push_back (const_cast<char *> (word.c_str ()));
-  arguments.push_back (nullptr);
-  const pid_t child = fork ();
-  if (child < 0)
-    fail ("cannot start " + words[0] + "; end other programs");
-  if (child == 0) {
-    prctl (PR_SET_PDEATHSIG, SIGTERM);
-    sigprocmask (SIG_SETMASK, &before, nullptr);
-    if (served_)
-      for (const auto &[name, value] : served_->environment ())
-        setenv (name.c_str (), value.c_str (), 1);
-    execvp (arguments[0], arguments.data ());
-    std::fprintf (stderr, "bench: cannot run %s: %s\n", arguments[0],
-        std::strerror (errno));
-    _exit (127);
-  }
-  int status = 0;
-  while (waitpid (child, &status, WNOHANG) == 0) {
-    siginfo_t info = {};
-    const int number = sigwaitinfo (&signals, &info);
-    const bool from_terminal = info.si_code == SI_KERNEL;
-    if (number > 0 && number != SIGCHLD && !from_terminal)
-      kill (child, number);
-  }
-  return WIFSIGNALED (status) ? 128 + WTERMSIG (status) : WEXITSTATUS (status);
-}
-
-/* The namespace is made, and signals are blocked, before there are threads. */
-Exit
-Bench::run ()
-{
-  if (faults_ == "help") {
-    std::printf (
-        "Faults of the bench, with --dmd:\n%s", fault_help ().c_str ());
-    return Exit::done;
-  }
-  check ();
-  name_this_program ();
-  sigset_t signals, before;
-  sigemptyset (&signals);
-  for (const int number : {SIGCHLD, SIGINT, SIGTERM, SIGHUP})
-    sigaddset (&signals, number);
-  sigprocmask (SIG_BLOCK, &signals, &before);
-  if (!address_)
-    value_of (leave_network (second_ ? 2 : cameras_.value_or (1)));
-  start_gstreamer ();
-  plan_ = SourcePlan::make (source_);
-  const int cameras = second_ ? 2 : cameras_.value_or (1);
-  if (second_ && !dmd_)
-    trigger_ = std::make_unique<SharedTrigger> (
-        std::llround (1e9 / camera_options (1).trigger_rate));
-  if (dmd_)
-    open_board ();
-  else
-    for (int number = 1; number <= cameras; number++)
-      open_camera (number);
-  if (address_) {
-    sigdelset (&signals, SIGCHLD); // of what looks for plugins
-    return serve_until_end (signals);
-  }
-  return Exit (run_command (signals, before));
-}
 
 } // namespace
 

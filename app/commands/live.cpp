@@ -16,15 +16,117 @@ namespace
 class Live
 {
 public:
-  void declare (Options &options);
-  Exit run ();
+  void declare (Options &options)
+  {
+    options.heading ("");
+    decode_.declare_method (options, "the stream");
+    options.value ("--fuse", decode_.fuse, "QUALITY",
+        "also full-size frames, in a third picture: fast; if fusion is too "
+        "slow, it skips coded frames",
+        one_of ({"fast", "balanced", "best", "learned"}));
+    options.value ("--record", record_, "FILE.mkv",
+        "also record all coded frames, with --second those of both cameras",
+        file_ending_in (".mkv"));
+    window_.declare (options);
+    options.flag ("--second", second_,
+        "also look through a second camera, in the beam of the mirrors that "
+        "are off: a last picture is the sum of both, and --fuse has both");
+    beside_.declare (options);
+    source_.declare (options, SourceOptions::Kind::watched);
+    run_.declare (options);
+    options.need ({"--force"}, "--record");
+    beside_.declare_relations (options);
+  }
+
+  Exit run ()
+  {
+    constexpr int kWaiting = 8; // frames, for the demultiplexer
+    constexpr Nanoseconds kPatience = 100'000'000;
+    if (second_)
+      beside_.check (source_);
+    start_gstreamer ();
+    Job job ("live", run_);
+    job.ends_by_signal = true;
+    const SourcePlan plan = this->plan ();
+    Chain frames = second_ ? coded_pairs (job, source_, plan, Pace::live,
+                                 beside_, kPatience)
+                           : coded_source (job, source_, plan, Pace::live);
+    if (record_)
+      frames = job.graph.from (add_recording (job, frames, plan), "src_%u");
+    job.keeper = window_.add_keeper (frames, "live", source_.bits);
+    job.counted = frames.queue (kWaiting).last ();
+    if (second_)
+      window_.last = "sum";
+    add_window (job, panes (job, frames), window_, source_.bits);
+    return play (job).exit;
+  }
 
 private:
-  SourcePlan plan ();
+  /* A fast event that comes again. */
+  SourcePlan plan ()
+  {
+    constexpr std::uint64_t kRepeat = 1'500'000'000; // ns
+    if (source_.is_simulated () && !source_.input && !source_.pattern)
+      source_.scene = source_.scene.value_or ("pour");
+    SourcePlan plan = SourcePlan::make (source_);
+    if (source_.scene && *source_.scene != "candle")
+      plan.scene_repeat = kRepeat;
+    return plan;
+  }
+
+  /* Returns the tee before the recording. If that fails, the window goes on. */
   GstElement *add_recording (
-      Job &job, Chain &chain, const SourcePlan &plan) const;
-  std::vector<Chain> panes (Job &job, Chain &frames) const;
-  void add_fused (Job &job, GstElement *tee, std::vector<Chain> &panes) const;
+      Job &job, Chain &chain, const SourcePlan &plan) const
+  {
+    GstElement *tee = chain.to ("tee").last ();
+    Chain recorded = job.graph.from (tee, "src_%u");
+    RecordingStyle style;
+    style.live = is_live (source_, Pace::live);
+    style.rate = plan.frame_rate;
+    write_recording (job, recorded, *record_, style);
+    job.buffer_may_fail = true;
+    return tee;
+  }
+
+  /* Frames of both cameras go to what needs both before they are split. */
+  std::vector<Chain> panes (Job &job, Chain &frames) const
+  {
+    GstElement *both = second_ ? frames.to ("tee").last () : nullptr;
+    Settings settings;
+    set_if (settings, "method", decode_.method);
+    set_if (settings, "mapping", decode_.mapping);
+    Chain split = both ? job.graph.from (both, "src_%u") : frames;
+    GstElement *demux = split.to ("codedexposure-demux", settings).last ();
+    Chain coded = job.graph.from (demux, "coded");
+    const Chain fast = job.graph.from (demux, "src");
+    if (!both && !decode_.fuse)
+      return {coded, fast};
+    GstElement *tee = both ? both : coded.to ("tee").last ();
+    std::vector<Chain> panes{
+        both ? coded : job.graph.from (tee, "src_%u"), fast};
+    add_fused (job, tee, panes);
+    return panes;
+  }
+
+  void add_fused (Job &job, GstElement *tee, std::vector<Chain> &panes) const
+  {
+    const auto branch = [&] (const char *name) -> Chain & {
+      return panes.emplace_back (job.graph.from (tee, "src_%u"))
+          .to ("queue", {{"name", name}, {"leaky", "downstream"},
+                            {"max-size-buffers", 4}});
+    };
+    if (decode_.fuse) {
+      Settings settings{{"quality", *decode_.fuse}};
+      set_if (settings, "mapping", decode_.mapping);
+      set_if (settings, "full-well", source_.full_well);
+      set_if (settings, "read-noise", source_.read_noise);
+      job.hurried.push_back (
+          branch ("fusing").to ("codedexposure-fuse", settings).last ());
+    }
+    if (second_)
+      job.hurried.push_back (
+          branch ("adding").to ("codedexposure-sum").last ());
+  }
 
   SourceOptions source_;
   DecodeOptions decode_;
@@ -34,120 +136,6 @@ private:
   bool second_ = false;
   SecondCamera beside_;
 };
-
-void
-Live::declare (Options &options)
-{
-  options.heading ("");
-  decode_.declare_method (options, "the stream");
-  options.value ("--fuse", decode_.fuse, "QUALITY",
-      "also full-size frames, in a third picture: fast; if fusion is too slow, "
-      "it skips coded frames",
-      one_of ({"fast", "balanced", "best", "learned"}));
-  options.value ("--record", record_, "FILE.mkv",
-      "also record all coded frames, with --second those of both cameras",
-      file_ending_in (".mkv"));
-  window_.declare (options);
-  options.flag ("--second", second_,
-      "also look through a second camera, in the beam of the mirrors that are "
-      "off: a last picture is the sum of both, and --fuse has both");
-  beside_.declare (options);
-  source_.declare (options, SourceOptions::Kind::watched);
-  run_.declare (options);
-  options.need ({"--force"}, "--record");
-  beside_.declare_relations (options);
-}
-
-/* A fast event that comes again. */
-SourcePlan
-Live::plan ()
-{
-  constexpr std::uint64_t kRepeat = 1'500'000'000; // ns
-  if (source_.is_simulated () && !source_.input && !source_.pattern)
-    source_.scene = source_.scene.value_or ("pour");
-  SourcePlan plan = SourcePlan::make (source_);
-  if (source_.scene && *source_.scene != "candle")
-    plan.scene_repeat = kRepeat;
-  return plan;
-}
-
-/* Returns the tee before the recording. If that fails, the window goes on. */
-GstElement *
-Live::add_recording (Job &job, Chain &chain, const SourcePlan &plan) const
-{
-  GstElement *tee = chain.to ("tee").last ();
-  Chain recorded = job.graph.from (tee, "src_%u");
-  RecordingStyle style;
-  style.live = is_live (source_, Pace::live);
-  style.rate = plan.frame_rate;
-  write_recording (job, recorded, *record_, style);
-  job.buffer_may_fail = true;
-  return tee;
-}
-
-void
-Live::add_fused (Job &job, GstElement *tee, std::vector<Chain> &panes) const
-{
-  const auto branch = [&] (const char *name) -> Chain & {
-    return panes.emplace_back (job.graph.from (tee, "src_%u"))
-        .to ("queue",
-            {{"name", name}, {"leaky", "downstream"}, {"max-size-buffers", 4}});
-  };
-  if (decode_.fuse) {
-    Settings settings{{"quality", *decode_.fuse}};
-    set_if (settings, "mapping", decode_.mapping);
-    set_if (settings, "full-well", source_.full_well);
-    set_if (settings, "read-noise", source_.read_noise);
-    job.hurried.push_back (
-        branch ("fusing").to ("codedexposure-fuse", settings).last ());
-  }
-  if (second_)
-    job.hurried.push_back (branch ("adding").to ("codedexposure-sum").last ());
-}
-
-/* Frames of both cameras go to what needs both before they are split. */
-std::vector<Chain>
-Live::panes (Job &job, Chain &frames) const
-{
-  GstElement *both = second_ ? frames.to ("tee").last () : nullptr;
-  Settings settings;
-  set_if (settings, "method", decode_.method);
-  set_if (settings, "mapping", decode_.mapping);
-  Chain split = both ? job.graph.from (both, "src_%u") : frames;
-  GstElement *demux = split.to ("codedexposure-demux", settings).last ();
-  Chain coded = job.graph.from (demux, "coded");
-  const Chain fast = job.graph.from (demux, "src");
-  if (!both && !decode_.fuse)
-    return {coded, fast};
-  GstElement *tee = both ? both : coded.to ("tee").last ();
-  std::vector<Chain> panes{both ? coded : job.graph.from (tee, "src_%u"), fast};
-  add_fused (job, tee, panes);
-  return panes;
-}
-
-Exit
-Live::run ()
-{
-  constexpr int kWaiting = 8; // frames, for the demultiplexer
-  constexpr Nanoseconds kPatience = 100'000'000;
-  if (second_)
-    beside_.check (source_);
-  start_gstreamer ();
-  Job job ("live", run_);
-  job.ends_by_signal = true;
-  const SourcePlan plan = this->plan ();
-  Chain frames =
-      second_ ? coded_pairs (job, source_, plan, Pace::live, beside_, kPatience)
-              : coded_source (job, source_, plan, Pace::live);
-  if (record_)
-    frames = job.graph.from (add_recording (job, frames, plan), "src_%u");
-  job.keeper = window_.add_keeper (frames, "live", source_.bits);
-  job.counted = frames.queue (kWaiting).last ();
-  if (second_)
-    window_.last = "sum";
-  add_window (job, panes (job, frames), window_, source_.bits);
-  return play (job).exit;
-}
 
 } // namespace
 

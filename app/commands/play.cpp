@@ -20,12 +20,73 @@ namespace
 class Play
 {
 public:
-  void declare (Options &options);
-  Exit run ();
+  void declare (Options &options)
+  {
+    options.word ("RECORDING.mkv", recording_);
+    options.heading ("");
+    decode_.declare (options);
+    options.value ("--export", export_, "FORM",
+        "what E writes: mp4, mkv, ome.tif, h5, ome.zarr or png [mp4]",
+        one_of ({"mp4", "mkv", "ome.tif", "h5", "ome.zarr", "png"}));
+    window_.declare (options, false);
+    run_.declare (options, false);
+  }
+
+  Exit run ()
+  {
+    start_gstreamer ();
+    Played played = this->played ();
+    Job job ("play", run_);
+    job.is_moved_in = true;
+    job.has_result = false;
+    const std::vector<Chain> shown = panes (job);
+    add_window (job, shown, window_, decode_.bits, std::move (played));
+    return play (job).exit;
+  }
 
 private:
-  Played played () const;
-  std::vector<Chain> panes (Job &job) const;
+  Played played () const
+  {
+    const RecordingInfo info = value_of (recording_info (recording_, true));
+    if (info.times.empty ())
+      fail (recording_ + " has no complete frame to show");
+    if (info.is_damaged)
+      fail (recording_ +
+            " is damaged between its frames, so a window cannot move in it; "
+            "\"codedexposure decode\" reads it from front to back");
+    std::optional<Schedule> schedule;
+    if (decode_.schedule)
+      schedule = value_of (Schedule::parse (*decode_.schedule), Exit::usage);
+    else if (info.setup)
+      schedule = info.setup->schedule;
+    else
+      fail (recording_ +
+                " does not say its schedule; set --schedule, or give the "
+                "recording itself if these pictures were decoded from it",
+          Exit::usage);
+    Played played;
+    played.recording = recording_;
+    played.slots = schedule->slots ();
+    if (info.setup && info.setup->rate)
+      played.rate = *info.setup->rate;
+    for (const Nanoseconds time : info.times)
+      played.positions.push_back (time - *info.start);
+    std::sort (played.positions.begin (), played.positions.end ());
+    const std::string form = export_ ? std::string (*export_) : "mp4";
+    played.pictures = decode_.fuse ? "fused" : "subframes";
+    played.form = form == "png" ? "/" : "." + form;
+    played.decode = decode_.words ();
+    return played;
+  }
+
+  std::vector<Chain> panes (Job &job) const
+  {
+    Chain frames = read_recording (job, recording_);
+    const DecoderPads pads = decode_.fuse
+                                 ? add_fusion (job, frames, decode_, {})
+                                 : add_demux (job, frames, decode_);
+    return {pads.coded (), pads.pictures};
+  }
 
   std::string recording_;
   DecodeOptions decode_;
@@ -33,76 +94,6 @@ private:
   RunOptions run_;
   std::optional<Text> export_;
 };
-
-void
-Play::declare (Options &options)
-{
-  options.word ("RECORDING.mkv", recording_);
-  options.heading ("");
-  decode_.declare (options);
-  options.value ("--export", export_, "FORM",
-      "what E writes: mp4, mkv, ome.tif, h5, ome.zarr or png [mp4]",
-      one_of ({"mp4", "mkv", "ome.tif", "h5", "ome.zarr", "png"}));
-  window_.declare (options, false);
-  run_.declare (options, false);
-}
-
-Played
-Play::played () const
-{
-  const RecordingInfo info = value_of (recording_info (recording_, true));
-  if (info.times.empty ())
-    fail (recording_ + " has no complete frame to show");
-  if (info.is_damaged)
-    fail (recording_ +
-          " is damaged between its frames, so a window cannot move in it; "
-          "\"codedexposure decode\" reads it from front to back");
-  std::optional<Schedule> schedule;
-  if (decode_.schedule)
-    schedule = value_of (Schedule::parse (*decode_.schedule), Exit::usage);
-  else if (info.setup)
-    schedule = info.setup->schedule;
-  else
-    fail (recording_ +
-              " does not say its schedule; set --schedule, or give the "
-              "recording itself if these pictures were decoded from it",
-        Exit::usage);
-  Played played;
-  played.recording = recording_;
-  played.slots = schedule->slots ();
-  if (info.setup && info.setup->rate)
-    played.rate = *info.setup->rate;
-  for (const Nanoseconds time : info.times)
-    played.positions.push_back (time - *info.start);
-  std::sort (played.positions.begin (), played.positions.end ());
-  const std::string form = export_ ? std::string (*export_) : "mp4";
-  played.pictures = decode_.fuse ? "fused" : "subframes";
-  played.form = form == "png" ? "/" : "." + form;
-  played.decode = decode_.words ();
-  return played;
-}
-
-std::vector<Chain>
-Play::panes (Job &job) const
-{
-  Chain frames = read_recording (job, recording_);
-  const DecoderPads pads = decode_.fuse ? add_fusion (job, frames, decode_, {})
-                                        : add_demux (job, frames, decode_);
-  return {pads.coded (), pads.pictures};
-}
-
-Exit
-Play::run ()
-{
-  start_gstreamer ();
-  Played played = this->played ();
-  Job job ("play", run_);
-  job.is_moved_in = true;
-  job.has_result = false;
-  const std::vector<Chain> shown = panes (job);
-  add_window (job, shown, window_, decode_.bits, std::move (played));
-  return play (job).exit;
-}
 
 } // namespace
 

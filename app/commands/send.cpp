@@ -14,11 +14,61 @@ namespace
 class Send
 {
 public:
-  void declare (Options &options);
-  Exit run ();
+  void declare (Options &options)
+  {
+    options.heading ("");
+    address_.declare (
+        options, "address to listen on; 0.0.0.0: all addresses", "TCP port");
+    options.value ("--codec", codec_, "C",
+        "raw, or ffv1: lossless, half of the data, but a good part of a core "
+        "[raw for 8 bits, else ffv1]",
+        one_of ({"raw", "ffv1"}));
+    options.flag ("--second", second_,
+        "also send the frames of a second camera, in the beam of the mirrors "
+        "that are off, with those of the first that have the same exposure");
+    beside_.declare (options);
+    options.flag ("--no-wait", no_wait_,
+        "start immediately; late receivers miss the beginning");
+    source_.declare (options);
+    run_.declare (options, false);
+    beside_.declare_relations (options);
+  }
+
+  Exit run ()
+  {
+    if (second_)
+      beside_.check (source_);
+    if (!run_.print)
+      address_.check ();
+    start_gstreamer ();
+    Job job ("send", run_);
+    job.ends_by_signal = true;
+    const SourcePlan plan = SourcePlan::make (source_);
+    const std::string codec =
+        codec_.value_or (plan.is_deep () ? "ffv1" : "raw");
+    constexpr Nanoseconds kPatience = 200'000'000;
+    Chain frames = second_ ? coded_pairs (job, source_, plan, Pace::live,
+                                 beside_, kPatience)
+                           : coded_source (job, source_, plan, Pace::live);
+    job.counted = frames.to ("queue").last ();
+    frames.to (
+        "codedexposure-recordmux", {{"codec", codec}, {"streamable", true}});
+    add_server (job, frames);
+    return play (job).exit;
+  }
 
 private:
-  void add_server (Job &job, Chain &frames) const;
+  /* A receiver for which 500 buffers wait, those of some 80 frames, is
+   * disconnected, to limit the memory. */
+  void add_server (Job &job, Chain &frames) const
+  {
+    frames.to ("tcpserversink",
+        {{"host", address_.host ()}, {"port", address_.port ()},
+            {"sync-method", "burst-keyframe"}, {"burst-format", "buffers"},
+            {"burst-value", 50}, {"buffers-min", 100}, {"buffers-max", 500}});
+    job.server = frames.last ();
+    job.waits_for_receiver = !no_wait_;
+  }
 
   SourceOptions source_;
   AddressOptions address_;
@@ -27,63 +77,6 @@ private:
   SecondCamera beside_;
   bool no_wait_ = false, second_ = false;
 };
-
-void
-Send::declare (Options &options)
-{
-  options.heading ("");
-  address_.declare (
-      options, "address to listen on; 0.0.0.0: all addresses", "TCP port");
-  options.value ("--codec", codec_, "C",
-      "raw, or ffv1: lossless, half of the data, but a good part of a core "
-      "[raw for 8 bits, else ffv1]",
-      one_of ({"raw", "ffv1"}));
-  options.flag ("--second", second_,
-      "also send the frames of a second camera, in the beam of the mirrors "
-      "that are off, with those of the first that have the same exposure");
-  beside_.declare (options);
-  options.flag ("--no-wait", no_wait_,
-      "start immediately; late receivers miss the beginning");
-  source_.declare (options);
-  run_.declare (options, false);
-  beside_.declare_relations (options);
-}
-
-/* A receiver for which 500 buffers wait, those of some 80 frames, is
- * disconnected, to limit the memory. */
-void
-Send::add_server (Job &job, Chain &frames) const
-{
-  frames.to ("tcpserversink",
-      {{"host", address_.host ()}, {"port", address_.port ()},
-          {"sync-method", "burst-keyframe"}, {"burst-format", "buffers"},
-          {"burst-value", 50}, {"buffers-min", 100}, {"buffers-max", 500}});
-  job.server = frames.last ();
-  job.waits_for_receiver = !no_wait_;
-}
-
-Exit
-Send::run ()
-{
-  if (second_)
-    beside_.check (source_);
-  if (!run_.print)
-    address_.check ();
-  start_gstreamer ();
-  Job job ("send", run_);
-  job.ends_by_signal = true;
-  const SourcePlan plan = SourcePlan::make (source_);
-  const std::string codec = codec_.value_or (plan.is_deep () ? "ffv1" : "raw");
-  constexpr Nanoseconds kPatience = 200'000'000;
-  Chain frames =
-      second_ ? coded_pairs (job, source_, plan, Pace::live, beside_, kPatience)
-              : coded_source (job, source_, plan, Pace::live);
-  job.counted = frames.to ("queue").last ();
-  frames.to (
-      "codedexposure-recordmux", {{"codec", codec}, {"streamable", true}});
-  add_server (job, frames);
-  return play (job).exit;
-}
 
 } // namespace
 

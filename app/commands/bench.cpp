@@ -124,7 +124,6 @@ private:
   struct Camera {
     std::unique_ptr<Job> job;
     std::unique_ptr<FrameSource> frames;
-    std::unique_ptr<TriggeredCamera> triggered; ///< one of two
     std::unique_ptr<GigeCamera> camera;
   };
 
@@ -181,13 +180,19 @@ private:
     FrameSource &frames = *opened.frames;
     options.width = frames.info ().width;
     options.height = frames.info ().height;
-    if (second_) {
-      opened.triggered = std::make_unique<TriggeredCamera> (*trigger_, frames);
-      options.shoot = [camera = opened.triggered.get ()] (
-                          ImageView<std::uint16_t> picture) {
-        return camera->shoot (picture);
+    /* Frame n of its source is that of exposure n. */
+    if (second_)
+      options.shoot = [this, &frames, last = std::optional<std::uint64_t> (),
+                          taken = std::uint64_t (0)] (
+                          ImageView<std::uint16_t> picture) mutable {
+        const auto shot = trigger_->next (last);
+        if (shot)
+          last = shot->number;
+        for (; shot && taken <= shot->number; taken++)
+          if (!frames.take (picture))
+            return std::optional<Shot> ();
+        return shot;
       };
-    }
     opened.camera = value_of (GigeCamera::open (
         options, [&frames] (std::uint64_t, ImageView<std::uint16_t> picture) {
           return frames.take (picture);

@@ -64,8 +64,52 @@ monotonic_now ()
 }
 
 struct SimulatedCamera final : public GigeCamera {
-  ~SimulatedCamera () override;
-  Result<void> start (GigeCameraOptions with, Expose light);
+  /* The server runs until it is destroyed, but no longer calls this object or
+   * sends anything. */
+  ~SimulatedCamera () override
+  {
+    if (!camera)
+      return;
+    set_loss (1);
+    arv_fake_camera_set_fill_pattern (camera, nullptr, nullptr);
+  }
+
+  Result<void> start (GigeCameraOptions with, Expose light)
+  {
+    ASSIGN_OR_RETURN (const auto description, GenicamFile::write (with));
+    options = std::move (with);
+    expose = std::move (light);
+    faults = options.faults;
+    random.seed (options.seed);
+    picture = Image<std::uint16_t> (options.width, options.height);
+    server.reset (arv_gv_fake_camera_new_full (options.address.c_str (),
+        options.serial.c_str (), description->path ().c_str ()));
+    if (!server || !arv_gv_fake_camera_is_running (server.get ()))
+      return Error{"no camera can be at " + in_quotes (options.address) +
+                   ", which is no address of this machine"};
+
+    camera = arv_gv_fake_camera_get_fake_camera (server.get ());
+    const std::pair<guint32, guint32> settings[] = {
+        {ARV_FAKE_CAMERA_REGISTER_SENSOR_WIDTH, guint32 (options.width)},
+        {ARV_FAKE_CAMERA_REGISTER_SENSOR_HEIGHT, guint32 (options.height)},
+        {ARV_FAKE_CAMERA_REGISTER_WIDTH, guint32 (options.width)},
+        {ARV_FAKE_CAMERA_REGISTER_HEIGHT, guint32 (options.height)},
+        {ARV_FAKE_CAMERA_REGISTER_PIXEL_FORMAT, options.bits > 8
+                                                    ? ARV_PIXEL_FORMAT_MONO_16
+                                                    : ARV_PIXEL_FORMAT_MONO_8},
+        {ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US, 10'000'000}};
+    for (const auto &[address, value] : settings)
+      arv_fake_camera_write_register (camera, address, value);
+    set_features ();
+    arv_fake_camera_set_fill_pattern (
+        camera,
+        [] (ArvBuffer *buffer, void *self, guint32, guint32, ArvPixelFormat) {
+          static_cast<SimulatedCamera *> (self)->send (buffer);
+        },
+        this);
+    return {};
+  }
+
   Result<void> add_faults (std::string_view text) override
   {
     const std::lock_guard guard (lock);
@@ -82,7 +126,7 @@ struct SimulatedCamera final : public GigeCamera {
   /* The camera's thread. */
   std::mt19937_64 random;
   double device_time = 1e9; // of the next frame, ns by the camera's clock
-  std::optional<CameraSettings> told; // of the frames before
+  std::optional<CameraSettings> told; // of the last frame
   bool stopped = false;
   Image<std::uint16_t> picture;
   std::vector<std::uint8_t> packed;
@@ -121,302 +165,231 @@ struct SimulatedCamera final : public GigeCamera {
     return triggered;
   }
 
-  CameraSettings settings ();
+  CameraSettings settings ()
+  {
+    CameraSettings set;
+    set.format =
+        format_of (get_register (ARV_FAKE_CAMERA_REGISTER_PIXEL_FORMAT));
+    set.width = int (get_register (ARV_FAKE_CAMERA_REGISTER_WIDTH));
+    set.height = int (get_register (ARV_FAKE_CAMERA_REGISTER_HEIGHT));
+    set.frame_rate = 1e9 / period ();
+    set.exposure_us = get_register (ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US);
+    set.triggered = get_register (kTriggerMode) == 1;
+    set.trigger_line =
+        int (get_register (ARV_FAKE_CAMERA_REGISTER_TRIGGER_SOURCE));
+    set.trigger_falling =
+        get_register (ARV_FAKE_CAMERA_REGISTER_TRIGGER_ACTIVATION) == 1;
+    for (guint32 k = 0; k < std::size (set.lines); k++) {
+      set.lines[k].output = get_register (kLineMode + k * kNextLine) == 1;
+      set.lines[k].exposure_active =
+          get_register (kLineSource + k * kNextLine) == 1;
+      set.lines[k].inverted = get_register (kLineInverter + k * kNextLine) == 1;
+    }
+    return set;
+  }
 
-  void set_features ();
-  void tell_settings ();
-  void tell_start (ArvBuffer *buffer);
-  std::optional<SentFrame> take ();
-  void send (ArvBuffer *buffer);
-  void bend ();
+  /* Those of the options that the camera has; others are for other cameras. */
+  void set_features ()
+  {
+    const auto number = [this] (const char *name, double usual) {
+      const auto found = options.features.find (name);
+      return found == options.features.end ()
+                 ? usual
+                 : parse_real (found->second).value_or (usual);
+    };
+    const auto set = [this] (guint32 address, guint32 value) {
+      arv_fake_camera_write_register (camera, address, value);
+    };
+    for (const ExtraFeature &feature : extra_features ())
+      if (const auto found = options.features.find (feature.name);
+          found != options.features.end ()) {
+        const auto value = std::ranges::find (feature.values, found->second);
+        if (value != feature.values.end ())
+          set (feature.address, guint32 (value - feature.values.begin ()));
+      }
+    for (const auto &[name, address, usual] : {std::tuple{"Gamma", kGamma, 1.0},
+             std::tuple{"TriggerDelay", kTriggerDelay, 0.0}})
+      set (address, std::bit_cast<guint32> (float (number (name, usual))));
+    const auto automatic = options.features.find ("GainAuto");
+    const bool on =
+        automatic != options.features.end () && automatic->second != "Off";
+    set (ARV_FAKE_CAMERA_REGISTER_GAIN_MODE, on ? 2 : 1);
+    const std::tuple<const char *, guint32, int> numbers[] = {
+        {"BinningHorizontal", ARV_FAKE_CAMERA_REGISTER_BINNING_HORIZONTAL, 1},
+        {"BinningVertical", ARV_FAKE_CAMERA_REGISTER_BINNING_VERTICAL, 1},
+        {"OffsetX", ARV_FAKE_CAMERA_REGISTER_X_OFFSET, 0},
+        {"OffsetY", ARV_FAKE_CAMERA_REGISTER_Y_OFFSET, 0},
+        {"GevSCPSPacketSize", kPacketSize, 1400},
+        {"WidthMax", ARV_FAKE_CAMERA_REGISTER_SENSOR_WIDTH, options.width},
+        {"HeightMax", ARV_FAKE_CAMERA_REGISTER_SENSOR_HEIGHT, options.height}};
+    if (!options.features.empty ())
+      for (const auto &[name, address, usual] : numbers)
+        set (address, guint32 (number (name, usual)));
+  }
+
+  void tell_settings ()
+  {
+    const CameraSettings now = settings ();
+    if (options.set_up && told != now)
+      options.set_up (now);
+    told = now;
+  }
+
+  /* The server makes a new buffer when a client starts the camera. */
+  void tell_start (ArvBuffer *buffer)
+  {
+    constexpr const char *kKnown = "codedexposure-known";
+    if (g_object_get_data (G_OBJECT (buffer), kKnown) != nullptr)
+      return;
+    g_object_set_data (G_OBJECT (buffer), kKnown, this);
+    if (options.started)
+      options.started ();
+  }
+
+  /* The next frame, its picture and what happens to it; none: there is none. */
+  std::optional<SentFrame> take ()
+  {
+    SentFrame taken{.host_time = monotonic_now ()};
+    bool lost = false;
+    if (options.shoot) {
+      const auto shot = options.shoot (picture.view ());
+      if (!shot)
+        return std::nullopt;
+      taken.frame = shot->number;
+      device_time = 1e9 + double (shot->begin) * (1 + options.drift * 1e-6);
+      lost = shot->lost;
+    }
+    const std::lock_guard guard (lock);
+    if (!options.shoot)
+      taken.frame = next;
+    next = taken.frame + 1;
+    taken.fault = lost ? Fault{Fault::Kind::lose} : faults.at (taken.frame);
+    taken.device_time = std::llround (device_time);
+    device_time += period () * (1 + options.drift * 1e-6);
+    return taken;
+  }
+
+  void send (ArvBuffer *buffer)
+  {
+    tell_settings ();
+    tell_start (buffer);
+    const auto sent = take ();
+    if (!sent) {
+      set_loss (1);
+      return;
+    }
+
+    /* The buffer does not know its size before it is received. */
+    const std::size_t size = arv_fake_camera_get_payload (camera);
+    arv_buffer_set_timestamp (buffer, guint64 (sent->device_time));
+    /* Without a gap where the camera asked in vain. */
+    if (options.shoot)
+      arv_buffer_set_frame_id (buffer, sent->frame % 65535 + 1);
+    if (options.shoot || expose (sent->frame, picture.view ())) {
+      bend ();
+      take_light ();
+      pack ();
+      obey (sent->fault, buffer, size);
+    } else
+      set_loss (1);
+    if (options.sent)
+      options.sent (*sent);
+  }
+
+  /* Applies the camera's gamma. */
+  void bend ()
+  {
+    if (options.features.empty () || get_register (kGammaEnable) == 0)
+      return;
+    const double gamma = std::bit_cast<float> (get_register (kGamma));
+    const int largest = largest_pixel (options.bits);
+    const auto table = response_table (largest, gamma);
+    for (int y = 0; y < picture.height (); y++)
+      for (int x = 0; x < picture.width (); x++) {
+        std::uint16_t &pixel = picture.at (x, y);
+        pixel = table[std::min<std::size_t> (pixel, std::size_t (largest))];
+      }
+  }
+
   void set_loss (double part)
   {
     g_object_set (server.get (), "gvsp-lost-ratio", part, nullptr);
   }
-  void take_light (MonoFormat format);
-  void pack (MonoFormat format, int width, int height);
-  void obey (const Fault &fault, ArvBuffer *buffer, std::size_t size);
-  void hold_up (const Fault &fault);
+
+  /* Scales the light by exposure time / period, in the bits of the format. */
+  void take_light ()
+  {
+    const double light =
+        options.shoot ? 1.0
+                      : std::min (1.0, 1e3 * told->exposure_us / period ());
+    const int shift = significant_bits (told->format) - options.bits;
+    if (light == 1.0 && shift == 0)
+      return;
+    for (int y = 0; y < picture.height (); y++)
+      for (int x = 0; x < picture.width (); x++) {
+        std::uint16_t &pixel = picture.at (x, y);
+        const auto value = std::uint32_t (std::lround (light * pixel));
+        pixel = std::uint16_t (shift >= 0 ? value << shift : value >> -shift);
+      }
+  }
+
+  /* Packs the picture in the size that the client has set: cropped, or with
+   * black at the right and the bottom. */
+  void pack ()
+  {
+    const std::size_t row = row_bytes (told->format, told->width);
+    packed.assign (row * std::size_t (told->height), 0);
+    const int columns = std::min (told->width, picture.width ());
+    const int rows = std::min (told->height, picture.height ());
+    const ImageView<std::uint8_t> out{
+        packed.data (), int (row), rows, std::ptrdiff_t (row)};
+    const auto whole = picture.view ();
+    /* Fits by construction. */
+    (void)pack_mono (
+        told->format, {whole.data, columns, rows, whole.stride}, out);
+  }
+
+  /* Applies @fault: sends this frame, an earlier one, or nothing. */
+  void obey (const Fault &fault, ArvBuffer *buffer, std::size_t size)
+  {
+    using Kind = Fault::Kind;
+    stopped |= fault.kind == Kind::stop;
+    kept.frames_ago++;
+    const bool again =
+        (kept.fault == Kind::duplicate && kept.frames_ago == 1) ||
+        (kept.fault == Kind::late && kept.frames_ago == 2);
+    const guint64 stamp = arv_buffer_get_timestamp (buffer);
+    auto *data = static_cast<std::uint8_t *> (
+        const_cast<void *> (arv_buffer_get_data (buffer, nullptr)));
+
+    if (fault.kind == Kind::duplicate || fault.kind == Kind::late)
+      kept = {packed, stamp, fault.kind, 0};
+    else if (again) {
+      packed.swap (kept.bytes);
+      arv_buffer_set_timestamp (buffer, kept.stamp);
+      kept = {};
+    }
+    std::copy_n (packed.begin (), std::min (size, packed.size ()), data);
+
+    double loss = options.packet_loss;
+    if (stopped || fault.kind == Kind::lose || fault.kind == Kind::late)
+      loss = 1;
+    else if (fault.kind == Kind::incomplete)
+      loss = 0.5;
+    set_loss (loss);
+    hold_up (fault);
+  }
+
+  void hold_up (const Fault &fault)
+  {
+    Nanoseconds time = fault.delay;
+    if (options.jitter > 0)
+      time += std::uniform_int_distribution<Nanoseconds> (0, options.jitter) (
+          random);
+    if (time > 0)
+      std::this_thread::sleep_for (std::chrono::nanoseconds (time));
+  }
 };
-
-CameraSettings
-SimulatedCamera::settings ()
-{
-  CameraSettings set;
-  set.format = format_of (get_register (ARV_FAKE_CAMERA_REGISTER_PIXEL_FORMAT));
-  set.width = int (get_register (ARV_FAKE_CAMERA_REGISTER_WIDTH));
-  set.height = int (get_register (ARV_FAKE_CAMERA_REGISTER_HEIGHT));
-  set.frame_rate = 1e9 / period ();
-  set.exposure_us = get_register (ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US);
-  set.triggered = get_register (kTriggerMode) == 1;
-  set.trigger_line =
-      int (get_register (ARV_FAKE_CAMERA_REGISTER_TRIGGER_SOURCE));
-  set.trigger_falling =
-      get_register (ARV_FAKE_CAMERA_REGISTER_TRIGGER_ACTIVATION) == 1;
-  for (guint32 k = 0; k < std::size (set.lines); k++) {
-    set.lines[k].output = get_register (kLineMode + k * kNextLine) == 1;
-    set.lines[k].exposure_active =
-        get_register (kLineSource + k * kNextLine) == 1;
-    set.lines[k].inverted = get_register (kLineInverter + k * kNextLine) == 1;
-  }
-  return set;
-}
-
-void
-SimulatedCamera::tell_settings ()
-{
-  const CameraSettings now = settings ();
-  if (options.set_up && told != now)
-    options.set_up (now);
-  told = now;
-}
-
-/* Scales the light by exposure time / period, in the bits of the format. */
-void
-SimulatedCamera::take_light (MonoFormat format)
-{
-  const double exposure =
-      1e3 * get_register (ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US);
-  const double light =
-      options.shoot ? 1.0 : std::min (1.0, exposure / period ());
-  const int shift = significant_bits (format) - options.bits;
-  if (light == 1.0 && shift == 0)
-    return;
-  for (int y = 0; y < picture.height (); y++)
-    for (int x = 0; x < picture.width (); x++) {
-      std::uint16_t &pixel = picture.at (x, y);
-      const auto value = std::uint32_t (std::lround (light * pixel));
-      pixel = std::uint16_t (shift >= 0 ? value << shift : value >> -shift);
-    }
-}
-
-/* Packs the picture in the size that the client has set: cropped, or with black
- * at the right and the bottom. */
-void
-SimulatedCamera::pack (MonoFormat format, int width, int height)
-{
-  const std::size_t row = row_bytes (format, width);
-  packed.assign (row * std::size_t (height), 0);
-  const int columns = std::min (width, picture.width ());
-  const int rows = std::min (height, picture.height ());
-  const ImageView<std::uint8_t> out{
-      packed.data (), int (row), rows, std::ptrdiff_t (row)};
-  const auto whole = picture.view ();
-  /* Fits by construction. */
-  (void)pack_mono (format, {whole.data, columns, rows, whole.stride}, out);
-}
-
-void
-SimulatedCamera::hold_up (const Fault &fault)
-{
-  Nanoseconds time = fault.delay;
-  if (options.jitter > 0)
-    time +=
-        std::uniform_int_distribution<Nanoseconds> (0, options.jitter) (random);
-  if (time > 0)
-    std::this_thread::sleep_for (std::chrono::nanoseconds (time));
-}
-
-/* Applies @fault: sends this frame, an earlier one, or nothing. */
-void
-SimulatedCamera::obey (const Fault &fault, ArvBuffer *buffer, std::size_t size)
-{
-  using Kind = Fault::Kind;
-  stopped |= fault.kind == Kind::stop;
-  kept.frames_ago++;
-  const bool again = (kept.fault == Kind::duplicate && kept.frames_ago == 1) ||
-                     (kept.fault == Kind::late && kept.frames_ago == 2);
-  const guint64 stamp = arv_buffer_get_timestamp (buffer);
-  auto *data = static_cast<std::uint8_t *> (
-      const_cast<void *> (arv_buffer_get_data (buffer, nullptr)));
-
-  if (fault.kind == Kind::duplicate || fault.kind == Kind::late)
-    kept = {packed, stamp, fault.kind, 0};
-  else if (again) {
-    packed.swap (kept.bytes);
-    arv_buffer_set_timestamp (buffer, kept.stamp);
-    kept = {};
-  }
-  std::copy_n (packed.begin (), std::min (size, packed.size ()), data);
-
-  double loss = options.packet_loss;
-  if (stopped || fault.kind == Kind::lose || fault.kind == Kind::late)
-    loss = 1;
-  else if (fault.kind == Kind::incomplete)
-    loss = 0.5;
-  set_loss (loss);
-  hold_up (fault);
-}
-
-/* The next frame, its picture and what happens to it; none: there is none. */
-std::optional<SentFrame>
-SimulatedCamera::take ()
-{
-  SentFrame taken{.host_time = monotonic_now ()};
-  bool lost = false;
-  if (options.shoot) {
-    const auto shot = options.shoot (picture.view ());
-    if (!shot)
-      return std::nullopt;
-    taken.frame = shot->number;
-    device_time = 1e9 + double (shot->begin) * (1 + options.drift * 1e-6);
-    lost = shot->lost;
-  }
-  const std::lock_guard guard (lock);
-  if (!options.shoot)
-    taken.frame = next;
-  next = taken.frame + 1;
-  taken.fault = lost ? Fault{Fault::Kind::lose} : faults.at (taken.frame);
-  taken.device_time = std::llround (device_time);
-  device_time += period () * (1 + options.drift * 1e-6);
-  return taken;
-}
-
-/* The server makes a new buffer when a client starts the camera. */
-void
-SimulatedCamera::tell_start (ArvBuffer *buffer)
-{
-  constexpr const char *kKnown = "codedexposure-known";
-  if (g_object_get_data (G_OBJECT (buffer), kKnown) != nullptr)
-    return;
-  g_object_set_data (G_OBJECT (buffer), kKnown, this);
-  if (options.started)
-    options.started ();
-}
-
-void
-SimulatedCamera::send (ArvBuffer *buffer)
-{
-  tell_settings ();
-  tell_start (buffer);
-  const auto sent = take ();
-  if (!sent) {
-    set_loss (1);
-    return;
-  }
-
-  const MonoFormat format =
-      format_of (get_register (ARV_FAKE_CAMERA_REGISTER_PIXEL_FORMAT));
-  /* The buffer does not know its size before it is received. */
-  const std::size_t size = arv_fake_camera_get_payload (camera);
-  arv_buffer_set_timestamp (buffer, guint64 (sent->device_time));
-  /* Without a gap where the camera asked in vain. */
-  if (options.shoot)
-    arv_buffer_set_frame_id (buffer, sent->frame % 65535 + 1);
-  if (options.shoot || expose (sent->frame, picture.view ())) {
-    bend ();
-    take_light (format);
-    pack (format, int (get_register (ARV_FAKE_CAMERA_REGISTER_WIDTH)),
-        int (get_register (ARV_FAKE_CAMERA_REGISTER_HEIGHT)));
-    obey (sent->fault, buffer, size);
-  } else
-    set_loss (1);
-  if (options.sent)
-    options.sent (*sent);
-}
-
-/* Applies the camera's gamma. */
-void
-SimulatedCamera::bend ()
-{
-  if (options.features.empty () || get_register (kGammaEnable) == 0)
-    return;
-  const double gamma = std::bit_cast<float> (get_register (kGamma));
-  const int largest = largest_pixel (options.bits);
-  const auto table = response_table (largest, gamma);
-  for (int y = 0; y < picture.height (); y++)
-    for (int x = 0; x < picture.width (); x++) {
-      std::uint16_t &pixel = picture.at (x, y);
-      pixel = table[std::min<std::size_t> (pixel, std::size_t (largest))];
-    }
-}
-
-/* The server runs until it is destroyed, but no longer calls this object or
- * sends anything. */
-SimulatedCamera::~SimulatedCamera ()
-{
-  if (!camera)
-    return;
-  set_loss (1);
-  arv_fake_camera_set_fill_pattern (camera, nullptr, nullptr);
-}
-
-/* Those of the options that the camera has; others are for other cameras. */
-void
-SimulatedCamera::set_features ()
-{
-  const auto number = [this] (const char *name, double usual) {
-    const auto found = options.features.find (name);
-    return found == options.features.end ()
-               ? usual
-               : parse_real (found->second).value_or (usual);
-  };
-  const auto set = [this] (guint32 address, guint32 value) {
-    arv_fake_camera_write_register (camera, address, value);
-  };
-  for (const ExtraFeature &feature : extra_features ())
-    if (const auto found = options.features.find (feature.name);
-        found != options.features.end ()) {
-      const auto value = std::ranges::find (feature.values, found->second);
-      if (value != feature.values.end ())
-        set (feature.address, guint32 (value - feature.values.begin ()));
-    }
-  for (const auto &[name, address, usual] : {std::tuple{"Gamma", kGamma, 1.0},
-           std::tuple{"TriggerDelay", kTriggerDelay, 0.0}})
-    set (address, std::bit_cast<guint32> (float (number (name, usual))));
-  const auto automatic = options.features.find ("GainAuto");
-  const bool on =
-      automatic != options.features.end () && automatic->second != "Off";
-  set (ARV_FAKE_CAMERA_REGISTER_GAIN_MODE, on ? 2 : 1);
-  const std::tuple<const char *, guint32, int> numbers[] = {
-      {"BinningHorizontal", ARV_FAKE_CAMERA_REGISTER_BINNING_HORIZONTAL, 1},
-      {"BinningVertical", ARV_FAKE_CAMERA_REGISTER_BINNING_VERTICAL, 1},
-      {"OffsetX", ARV_FAKE_CAMERA_REGISTER_X_OFFSET, 0},
-      {"OffsetY", ARV_FAKE_CAMERA_REGISTER_Y_OFFSET, 0},
-      {"GevSCPSPacketSize", kPacketSize, 1400},
-      {"WidthMax", ARV_FAKE_CAMERA_REGISTER_SENSOR_WIDTH, options.width},
-      {"HeightMax", ARV_FAKE_CAMERA_REGISTER_SENSOR_HEIGHT, options.height}};
-  if (!options.features.empty ())
-    for (const auto &[name, address, usual] : numbers)
-      set (address, guint32 (number (name, usual)));
-}
-
-Result<void>
-SimulatedCamera::start (GigeCameraOptions with, Expose light)
-{
-  ASSIGN_OR_RETURN (const auto description, GenicamFile::write (with));
-  options = std::move (with);
-  expose = std::move (light);
-  faults = options.faults;
-  random.seed (options.seed);
-  picture = Image<std::uint16_t> (options.width, options.height);
-  server.reset (arv_gv_fake_camera_new_full (options.address.c_str (),
-      options.serial.c_str (), description->path ().c_str ()));
-  if (!server || !arv_gv_fake_camera_is_running (server.get ()))
-    return Error{"no camera can be at " + in_quotes (options.address) +
-                 ", which is no address of this machine"};
-
-  camera = arv_gv_fake_camera_get_fake_camera (server.get ());
-  const std::pair<guint32, guint32> settings[] = {
-      {ARV_FAKE_CAMERA_REGISTER_SENSOR_WIDTH, guint32 (options.width)},
-      {ARV_FAKE_CAMERA_REGISTER_SENSOR_HEIGHT, guint32 (options.height)},
-      {ARV_FAKE_CAMERA_REGISTER_WIDTH, guint32 (options.width)},
-      {ARV_FAKE_CAMERA_REGISTER_HEIGHT, guint32 (options.height)},
-      {ARV_FAKE_CAMERA_REGISTER_PIXEL_FORMAT, options.bits > 8
-                                                  ? ARV_PIXEL_FORMAT_MONO_16
-                                                  : ARV_PIXEL_FORMAT_MONO_8},
-      {ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US, 10'000'000}};
-  for (const auto &[address, value] : settings)
-    arv_fake_camera_write_register (camera, address, value);
-  set_features ();
-  arv_fake_camera_set_fill_pattern (
-      camera,
-      [] (ArvBuffer *buffer, void *self, guint32, guint32, ArvPixelFormat) {
-        static_cast<SimulatedCamera *> (self)->send (buffer);
-      },
-      this);
-  return {};
-}
 
 } // namespace
 

@@ -128,48 +128,11 @@ public:
   {
     const std::lock_guard guard (lock_);
     board_->unplug ();
-    drop_all (-ENODEV);
-  }
-  bool kernel_bound () const
-  {
-    const std::lock_guard guard (lock_);
-    return bound_;
-  }
-  bool running () const
-  {
-    const std::lock_guard guard (lock_);
-    return board_->running ();
-  }
-  bool idle () const
-  {
-    // What comes last on the bed's thread runs when nobody has asked for
-    // anything that is not answered.
-    const auto answered = std::make_shared<std::promise<void>> ();
-    using Held = std::shared_ptr<std::promise<void>>;
-    GSource *const last = g_idle_source_new ();
-    g_source_set_priority (last, G_PRIORITY_LOW);
-    g_source_set_callback (
-        last,
-        [] (gpointer held) -> gboolean {
-          (*static_cast<Held *> (held))->set_value ();
-          return G_SOURCE_REMOVE;
-        },
-        new Held (answered),
-        [] (gpointer held) { delete static_cast<Held *> (held); });
-    g_source_attach (last, context_);
-    constexpr auto kPatience = std::chrono::milliseconds (100);
-    const auto seen = answered->get_future ().wait_for (kPatience);
-    g_source_destroy (last);
-    g_source_unref (last);
-    return seen == std::future_status::ready;
-  }
-  void occupy ()
-  {
-    const std::lock_guard guard (lock_);
-    occupied_ = true;
+    drop_all ();
   }
 
 private:
+  friend class UsbBed;
   struct Urb {
     std::unique_ptr<Owner> owner;
     Reference urb, buffer;
@@ -183,24 +146,19 @@ private:
   {
     /* A process may be killed in the middle of it. */
     const ClientRef held = ref (client);
-    int error = 0;
-    const int result = static_cast<UsbPort *> (self)->handle (client, error);
+    const int result = static_cast<UsbPort *> (self)->handle (client);
     // To poll (), a node in software is always ready: whoever waits for
     // something to reap would ask as fast as it can.
-    if (error == EAGAIN)
+    if (result == -EAGAIN)
       std::this_thread::sleep_for (std::chrono::milliseconds (1));
     if (umockdev_ioctl_client_get_connected (client))
-      umockdev_ioctl_client_complete (client, result, error);
+      umockdev_ioctl_client_complete (
+          client, std::max (result, -1), -std::min (result, 0));
     return TRUE;
   }
 
-  int fail (int &error, int code)
-  {
-    error = code;
-    return -1;
-  }
-
-  int handle (UMockdevIoctlClient *client, int &error)
+  /** As the kernel: below 0, it is an error. */
+  int handle (UMockdevIoctlClient *client)
   {
     const std::lock_guard guard (lock_);
     if (context_ == nullptr)
@@ -208,66 +166,55 @@ private:
     drop_orphans ();
     const auto request =
         std::uint32_t (umockdev_ioctl_client_get_request (client));
-    const auto argument = [client] {
-      // The client owns its argument.
-      return umockdev_ioctl_client_get_arg (client);
-    };
+    auto *const argument = umockdev_ioctl_client_get_arg (client);
     if (board_->gone ())
-      drop_all (-ENODEV);
-    switch (request) {
-    case USBDEVFS_GET_CAPABILITIES: {
-      const Reference value = resolve (argument (), 0, sizeof (std::uint32_t));
+      drop_all ();
+    if (request == USBDEVFS_GET_CAPABILITIES) {
+      const Reference value = resolve (argument, 0, sizeof (std::uint32_t));
       if (!value)
-        return fail (error, EFAULT);
+        return -EFAULT;
       *as<std::uint32_t> (value) = USBDEVFS_CAP_REAP_AFTER_DISCONNECT;
       return 0;
     }
-    case USBDEVFS_REAPURBNDELAY:
-      return reap (client, argument (), error);
-    default:
-      break;
-    }
+    if (request == USBDEVFS_REAPURBNDELAY)
+      return reap (client, argument);
     if (board_->gone ())
-      return fail (error, ENODEV);
-    switch (request) {
-    case USBDEVFS_SUBMITURB:
-      return submit (client, argument (), error);
-    case USBDEVFS_DISCARDURB:
-      return discard (argument (), error);
-    default:
-      return manage (client, request, error);
-    }
+      return -ENODEV;
+    if (request == USBDEVFS_SUBMITURB)
+      return submit (client, argument);
+    if (request == USBDEVFS_DISCARDURB)
+      return discard (argument);
+    return manage (argument, request);
   }
 
   /** Interfaces and drivers. */
-  int manage (UMockdevIoctlClient *client, std::uint32_t request, int &error)
+  int manage (UMockdevIoctlData *argument, std::uint32_t request)
   {
-    auto *const argument = umockdev_ioctl_client_get_arg (client);
     switch (request) {
     case USBDEVFS_GETDRIVER: {
       if (!bound_)
-        return fail (error, ENODATA);
+        return -ENODATA;
       const Reference value =
           resolve (argument, 0, sizeof (usbdevfs_getdriver));
       if (!value)
-        return fail (error, EFAULT);
+        return -EFAULT;
       std::strcpy (as<usbdevfs_getdriver> (value)->driver, "usbhid");
       return 0;
     }
     case USBDEVFS_IOCTL: {
       const Reference value = resolve (argument, 0, sizeof (usbdevfs_ioctl));
       if (!value)
-        return fail (error, EFAULT);
+        return -EFAULT;
       const auto code = std::uint32_t (as<usbdevfs_ioctl> (value)->ioctl_code);
       if (code == USBDEVFS_DISCONNECT && !bound_)
-        return fail (error, ENODATA);
+        return -ENODATA;
       bound_ = code == USBDEVFS_CONNECT;
       return 0;
     }
     case USBDEVFS_DISCONNECT_CLAIM:
     case USBDEVFS_CLAIMINTERFACE:
       if (occupied_ || (request == USBDEVFS_CLAIMINTERFACE && bound_))
-        return fail (error, EBUSY);
+        return -EBUSY;
       bound_ = false;
       return 0;
     case USBDEVFS_RELEASEINTERFACE:
@@ -277,25 +224,24 @@ private:
     case USBDEVFS_SETCONFIGURATION:
       return 0;
     default:
-      return fail (error, ENOTTY);
+      return -ENOTTY;
     }
   }
 
-  int submit (
-      UMockdevIoctlClient *client, UMockdevIoctlData *argument, int &error)
+  int submit (UMockdevIoctlClient *client, UMockdevIoctlData *argument)
   {
     Urb urb;
     urb.owner = std::make_unique<Owner> (client);
     urb.urb = resolve (argument, 0, sizeof (usbdevfs_urb));
     if (!urb.urb.get ())
-      return fail (error, EFAULT);
+      return -EFAULT;
     urb.address = urb.urb.get ()->client_addr;
     const int length = urb.get ()->buffer_length;
     if (length > 0)
       urb.buffer = resolve (urb.urb.get (), offsetof (usbdevfs_urb, buffer),
           std::size_t (length));
     if (length > 0 && !urb.buffer.get ())
-      return fail (error, EFAULT);
+      return -EFAULT;
     if (urb.get ()->type == USBDEVFS_URB_TYPE_CONTROL)
       finish_control (std::move (urb));
     else if (urb.get ()->endpoint == kIn)
@@ -362,23 +308,22 @@ private:
     finish (std::move (urb), string ? 0 : -EPIPE, string ? length : 0);
   }
 
-  int reap (
-      UMockdevIoctlClient *client, UMockdevIoctlData *argument, int &error)
+  int reap (UMockdevIoctlClient *client, UMockdevIoctlData *argument)
   {
     const auto found = std::find_if (done_.begin (), done_.end (),
         [client] (const Urb &urb) { return urb.owner->is (client); });
     if (found == done_.end ())
-      return fail (error, board_->gone () ? ENODEV : EAGAIN);
+      return board_->gone () ? -ENODEV : -EAGAIN;
     const Urb urb = std::move (*found);
     done_.erase (found);
     const Reference slot = resolve (argument, 0, sizeof (gpointer));
     if (!slot.get ())
-      return fail (error, EFAULT);
+      return -EFAULT;
     umockdev_ioctl_data_set_ptr (slot.get (), 0, urb.urb.get ());
     return 0;
   }
 
-  int discard (UMockdevIoctlData *argument, int &error)
+  int discard (UMockdevIoctlData *argument)
   {
     const auto address = *reinterpret_cast<const gulong *> (argument->data);
     for (auto *const urbs : {&waiting_, &held_})
@@ -390,7 +335,7 @@ private:
           finish (std::move (urb), -ENOENT, sent);
           return 0;
         }
-    return fail (error, EINVAL);
+    return -EINVAL;
   }
 
   /** Discards the pending transfers of a process that ended. */
@@ -402,11 +347,11 @@ private:
     std::erase_if (done_, orphaned);
   }
 
-  void drop_all (int status)
+  void drop_all ()
   {
     for (auto *const urbs : {&waiting_, &held_}) {
       for (Urb &urb : *urbs)
-        finish (std::move (urb), status, 0);
+        finish (std::move (urb), -ENODEV, 0);
       urbs->clear ();
     }
   }
@@ -415,7 +360,7 @@ private:
   const std::shared_ptr<EmulatedHid> board_;
   UMockdevIoctlBase *const handler_;
   std::atomic<GMainContext *> context_ = nullptr; // of the bed's thread
-  mutable std::mutex lock_; // covers everything below, and the board
+  std::mutex lock_; // covers everything below, and the board
   bool bound_ = true;
   bool occupied_ = false;
   std::vector<Urb> waiting_; // for packets from the board
@@ -493,25 +438,47 @@ UsbBed::forget_pulled ()
 bool
 UsbBed::kernel_driver_bound (const std::string &port) const
 {
-  return ports_.at (port)->kernel_bound ();
+  const std::lock_guard guard (ports_.at (port)->lock_);
+  return ports_.at (port)->bound_;
 }
 
 bool
 UsbBed::running (const std::string &port) const
 {
-  return ports_.at (port)->running ();
+  const std::lock_guard guard (ports_.at (port)->lock_);
+  return ports_.at (port)->board_->running ();
 }
 
 bool
 UsbBed::idle (const std::string &port) const
 {
-  return ports_.at (port)->idle ();
+  // What comes last on the bed's thread runs when nobody has asked for
+  // anything that is not answered.
+  const auto answered = std::make_shared<std::promise<void>> ();
+  using Held = std::shared_ptr<std::promise<void>>;
+  GSource *const last = g_idle_source_new ();
+  g_source_set_priority (last, G_PRIORITY_LOW);
+  g_source_set_callback (
+      last,
+      [] (gpointer held) -> gboolean {
+        (*static_cast<Held *> (held))->set_value ();
+        return G_SOURCE_REMOVE;
+      },
+      new Held (answered),
+      [] (gpointer held) { delete static_cast<Held *> (held); });
+  g_source_attach (last, ports_.at (port)->context_);
+  constexpr auto kPatience = std::chrono::milliseconds (100);
+  const auto seen = answered->get_future ().wait_for (kPatience);
+  g_source_destroy (last);
+  g_source_unref (last);
+  return seen == std::future_status::ready;
 }
 
 void
 UsbBed::occupy (const std::string &port)
 {
-  ports_.at (port)->occupy ();
+  const std::lock_guard guard (ports_.at (port)->lock_);
+  ports_.at (port)->occupied_ = true;
 }
 
 } // namespace codedexposure::emulated

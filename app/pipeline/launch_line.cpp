@@ -3,6 +3,7 @@
 #include <set>
 
 #include "pipeline/graph.h"
+#include "pipeline/pads.h"
 
 namespace codedexposure::app
 {
@@ -122,10 +123,7 @@ private:
   {
     if (element->numsrcpads != 1)
       return nullptr;
-    const ObjectPtr<GstPad> peer (
-        gst_pad_get_peer (GST_PAD (element->srcpads->data)));
-    const ObjectPtr<GstElement> next (
-        peer ? gst_pad_get_parent_element (peer.get ()) : nullptr);
+    const auto next = element_behind (GST_PAD (element->srcpads->data));
     if (!next || next->numsinkpads != 1 || written_.contains (next.get ()) ||
         GST_OBJECT_PARENT (next.get ()) != GST_OBJECT (pipeline_))
       return nullptr;
@@ -144,13 +142,10 @@ private:
     }
     for (GList *item = element->srcpads; item; item = item->next) {
       GstPad *pad = GST_PAD (item->data);
-      const ObjectPtr<GstPad> peer (gst_pad_get_peer (pad));
-      const ObjectPtr<GstElement> next (
-          peer ? gst_pad_get_parent_element (peer.get ()) : nullptr);
-      if (next)
+      if (const auto next = element_behind (pad))
         links_ += std::string (" ") + GST_OBJECT_NAME (element) + "." +
                   GST_PAD_NAME (pad) + " ! " + GST_OBJECT_NAME (next.get ()) +
-                  "." + GST_PAD_NAME (peer.get ());
+                  "." + GST_PAD_NAME (GST_PAD_PEER (pad));
     }
     if (element->numsrcpads == 0 && late_link_of (element))
       links_ += std::string (" ") + GST_OBJECT_NAME (element) + ". ! " +

@@ -31,9 +31,8 @@ public:
 
   bool is_before (const GstElement *element) const
   {
-    const gst::ObjectPtr<GstPad> next (
-        gst_pad_get_peer (pad_of (queue_.get (), "src").get ()));
-    return next && GST_PAD_PARENT (next.get ()) == element;
+    return element_behind (pad_of (queue_.get (), "src").get ()).get () ==
+           element;
   }
 
   /** Without those that wait. */

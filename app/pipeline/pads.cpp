@@ -32,6 +32,14 @@ watch_buffers (GstPad *pad, std::function<void (GstPad *, GstBuffer *)> take)
       });
 }
 
+ObjectPtr<GstElement>
+element_behind (GstPad *pad)
+{
+  const ObjectPtr<GstPad> peer (gst_pad_get_peer (pad));
+  return ObjectPtr<GstElement> (
+      peer ? gst_pad_get_parent_element (peer.get ()) : nullptr);
+}
+
 std::optional<GstSegment>
 segment_at (GstPad *pad)
 {

@@ -21,6 +21,8 @@ gulong add_probe (GstPad *pad, int what, Probe probe);
 void watch_buffers (
     GstPad *pad, std::function<void (GstPad *, GstBuffer *)> take);
 
+/** The element that @p pad is linked to; null: there is none. */
+gst::ObjectPtr<GstElement> element_behind (GstPad *pad);
 /** None: no segment has come. */
 std::optional<GstSegment> segment_at (GstPad *pad);
 /** None: no caps have come, or not those of raw video. */

@@ -206,9 +206,7 @@ Pictures::claim (bool replace)
 void
 Pictures::watch_flags (GstPad *sink_pad)
 {
-  const ObjectPtr<GstPad> from (gst_pad_get_peer (sink_pad));
-  const ObjectPtr<GstElement> encoder (
-      from ? gst_pad_get_parent_element (from.get ()) : nullptr);
+  const auto encoder = element_behind (sink_pad);
   const ObjectPtr<GstPad> pad (
       encoder ? gst_element_get_static_pad (encoder.get (), "sink") : nullptr);
   if (pad)

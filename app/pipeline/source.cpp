@@ -107,9 +107,7 @@ check_first_frame (GstPad *pad, GstPadProbeInfo *info, GstClockTime least)
   if (!meta || !GST_CLOCK_TIME_IS_VALID (meta->exposure_duration) ||
       meta->exposure_duration > least)
     return GST_PAD_PROBE_REMOVE;
-  const ObjectPtr<GstPad> source (gst_pad_get_peer (pad));
-  const ObjectPtr<GstElement> camera (
-      gst_pad_get_parent_element (source.get ()));
+  const auto camera = element_behind (pad);
   const auto in_us = [] (GstClockTime time) {
     return real_text (1e-3 * double (time)) + " us";
   };

@@ -2,7 +2,10 @@
 /* Where coded frames are sent. */
 #pragma once
 
-#include "options.h"
+#include <netdb.h>
+
+#include "failure.h"
+#include "options/options.h"
 
 namespace codedexposure::app
 {
@@ -22,7 +25,16 @@ public:
   std::string host () const { return host_.value_or ("127.0.0.1"); }
   int port () const { return port_.value_or (5000); }
   /** Throws Failure if no such machine is known. */
-  void check () const;
+  void check () const
+  {
+    addrinfo *found = nullptr;
+    const int error = getaddrinfo (host ().c_str (), nullptr, nullptr, &found);
+    if (error != 0)
+      usage_error (
+          "--host " + host () + " is not known here (" + gai_strerror (error) +
+          "); give the name or the address of a machine in this network");
+    freeaddrinfo (found);
+  }
 
 private:
   std::optional<Text> host_;

@@ -1,9 +1,15 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 #include "source.h"
 
+#include <filesystem>
+#include <memory>
+
+#include <gst/pbutils/pbutils.h>
+
 #include "base/text.h"
+#include "common/raii.h"
+#include "common/tag.h"
 #include "failure.h"
-#include "pipeline/probe.h"
 
 namespace codedexposure::app
 {
@@ -203,14 +209,41 @@ use_bench (SourcePlan &plan, const SourceOptions &options)
                  "DMD");
 }
 
+/* Reads the head of the video. */
 void
 use_input (SourcePlan &plan, const SourceOptions &options)
 {
-  const VideoFacts facts = probe_video (*options.input);
-  plan.size = facts.size;
-  plan.input_rate = options.input_rate.value_or (facts.rate);
+  constexpr GstClockTime kPatience = 30 * GST_SECOND;
+  const std::string &path = *options.input;
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file (path, ignored))
+    fail ("cannot read " + path + "; give the name of a video file");
+  const gst::ObjectPtr<GstDiscoverer> discoverer (
+      gst_discoverer_new (kPatience, nullptr));
+  const gst::CharPtr uri (gst_filename_to_uri (path.c_str (), nullptr));
+  const gst::ObjectPtr<GstDiscovererInfo> info (
+      discoverer && uri
+          ? gst_discoverer_discover_uri (discoverer.get (), uri.get (), nullptr)
+          : nullptr);
+  const std::unique_ptr<GList, FreeWith<gst_discoverer_stream_info_list_free>>
+      streams (
+          info ? gst_discoverer_info_get_video_streams (info.get ()) : nullptr);
+  if (!streams)
+    fail (path + " is no video that the installed decoders can read");
+  auto *video = GST_DISCOVERER_VIDEO_INFO (streams->data);
+  for (const GstTagList *tags : {gst_discoverer_info_get_tags (info.get ()),
+           gst_discoverer_stream_info_get_tags (
+               GST_DISCOVERER_STREAM_INFO (video))})
+    if (tags && gst::setup_from_tags (tags))
+      fail (path + " has coded frames, which are no scene; decode it first",
+          Exit::usage);
+  plan.size = {int (gst_discoverer_video_info_get_width (video)),
+      int (gst_discoverer_video_info_get_height (video))};
+  plan.input_rate = options.input_rate.value_or (
+      FrameRate{int (gst_discoverer_video_info_get_framerate_num (video)),
+          int (gst_discoverer_video_info_get_framerate_denom (video))});
   if (plan.input_rate.num == 0)
-    usage_error (*options.input + " has no fixed frame rate; set --input-rate");
+    usage_error (path + " has no fixed frame rate; set --input-rate");
 }
 
 /* A shorter exposure leaves masks out, and a longer one misses the trigger of

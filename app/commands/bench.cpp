@@ -168,12 +168,11 @@ private:
     Camera &opened = open_.emplace_back ();
     opened.job = std::make_unique<Job> ("bench", RunOptions{});
     SourceOptions source = source_;
-    Settings beam;
-    if (second_ && number == 2) {
-      beam = {{"beam", "off"}};
+    const bool is_off = second_ && number == 2;
+    if (is_off)
       source.seed = 1 + source.seed.value_or (0);
-    }
-    Chain chain = simulation (*opened.job, source, plan_, Pace::fast, beam);
+    Chain chain = simulation (*opened.job, source, plan_, Pace::fast,
+        {{"beam", is_off ? "off" : "on"}});
     limit_frames (*opened.job, source_, chain);
     const bool loop = !source_.frames && source_.input;
     opened.frames = value_of (FrameSource::open (chain, loop));

@@ -76,11 +76,8 @@ public:
     Chain chain =
         second_ ? coded_pairs (job, source_, plan, pace, beside_, kPatience)
                 : coded_source (job, source_, plan, pace);
-    Settings settings;
-    set_if (settings, "mode", mode_);
-    set_if (settings, "mirror-pitch", mirror_pitch_);
-    set_if (settings, "tolerance", tolerance_);
-    chain.to ("moirecalib", settings);
+    chain.to ("moirecalib", {{"mode", mode_}, {"mirror-pitch", mirror_pitch_},
+                                {"tolerance", tolerance_}});
     GstElement *calib = chain.last ();
     job.counted = calib;
     if (mode_ != "align")

@@ -266,9 +266,8 @@ private:
       keep_times (chain.to ("queue").last ());
       count_flags (chain.last (), *output_);
       if (statistics_) {
-        Settings settings{{"format", "csv"}, {"post-messages", false}};
-        set_if (settings, "bits", decode_.bits);
-        chain.to ("subframestats", settings);
+        chain.to ("subframestats", {{"format", "csv"}, {"post-messages", false},
+                                       {"bits", decode_.bits}});
         job.outputs.file (chain.last (), "location", *statistics_,
             {.frames = pad_of (chain.last (), "sink").get (), .sidecar = true});
       }
@@ -294,9 +293,8 @@ private:
   void build_search (Job &job) const
   {
     Chain chain = read_recording (job, recording_);
-    Settings settings{{"mode", "phase"}, {"overlay", false}};
-    set_if (settings, "schedule", decode_.schedule);
-    chain.to ("moirecalib", settings);
+    chain.to ("moirecalib", {{"mode", "phase"}, {"overlay", false},
+                                {"schedule", decode_.schedule}});
     job.counted = chain.last ();
     job.times = times ();
     chain.to ("fakesink");

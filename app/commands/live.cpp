@@ -92,11 +92,12 @@ private:
   std::vector<Chain> panes (Job &job, Chain &frames) const
   {
     GstElement *both = second_ ? frames.to ("tee").last () : nullptr;
-    Settings settings;
-    set_if (settings, "method", decode_.method);
-    set_if (settings, "mapping", decode_.mapping);
     Chain split = both ? job.graph.from (both, "src_%u") : frames;
-    GstElement *demux = split.to ("codedexposure-demux", settings).last ();
+    GstElement *demux =
+        split
+            .to ("codedexposure-demux",
+                {{"method", decode_.method}, {"mapping", decode_.mapping}})
+            .last ();
     Chain coded = job.graph.from (demux, "coded");
     const Chain fast = job.graph.from (demux, "src");
     if (!both && !decode_.fuse)
@@ -115,14 +116,14 @@ private:
           .to ("queue", {{"name", name}, {"leaky", "downstream"},
                             {"max-size-buffers", 4}});
     };
-    if (decode_.fuse) {
-      Settings settings{{"quality", *decode_.fuse}};
-      set_if (settings, "mapping", decode_.mapping);
-      set_if (settings, "full-well", source_.full_well);
-      set_if (settings, "read-noise", source_.read_noise);
+    if (decode_.fuse)
       job.hurried.push_back (
-          branch ("fusing").to ("codedexposure-fuse", settings).last ());
-    }
+          branch ("fusing")
+              .to ("codedexposure-fuse",
+                  {{"quality", decode_.fuse}, {"mapping", decode_.mapping},
+                      {"full-well", source_.full_well},
+                      {"read-noise", source_.read_noise}})
+              .last ());
     if (second_)
       job.hurried.push_back (
           branch ("adding").to ("codedexposure-sum").last ());

@@ -198,9 +198,7 @@ private:
     Chain chain = read_recording (job, recording);
     chain.queue (8);
     job.counted = chain.last ();
-    Settings settings;
-    set_if (settings, "threads", threads_);
-    chain.to ("codedexposure-recordmux", settings)
+    chain.to ("codedexposure-recordmux", {{"threads", threads_}})
         .to ("filesink", {{"location", to}});
     return play (job);
   }

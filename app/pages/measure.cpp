@@ -37,12 +37,10 @@ void
 add_meter (Chain chain, const MeasureOptions &options, MeasuredStream &stream,
     const std::string &csv)
 {
-  Settings settings{
-      {"format", "csv"}, {"post-messages", false}, {"line", options.line}};
-  set_if (settings, "bits", options.decode.bits);
-  if (!csv.empty ())
-    settings.emplace_back ("location", csv);
-  chain.to ("queue").to ("subframestats", settings);
+  const auto location = csv.empty () ? std::nullopt : std::optional (csv);
+  chain.to ("queue").to ("subframestats",
+      {{"format", "csv"}, {"post-messages", false}, {"line", options.line},
+          {"bits", options.decode.bits}, {"location", location}});
   watch_buffers (pad_of (chain.last (), "src").get (),
       [&stream] (
           GstPad *pad, GstBuffer *picture) { stream.add (pad, picture); });

@@ -12,12 +12,9 @@ namespace
 Settings
 shared_settings (const DecodeOptions &options)
 {
-  Settings settings{{"require-schedule", true}};
-  set_if (settings, "mapping", options.mapping);
-  set_if (settings, "schedule", options.schedule);
-  set_if (settings, "bench", options.bench);
-  set_if (settings, "bits", options.bits);
-  return settings;
+  return {{"require-schedule", true}, {"mapping", options.mapping},
+      {"schedule", options.schedule}, {"bench", options.bench},
+      {"bits", options.bits}};
 }
 
 } // namespace
@@ -27,7 +24,7 @@ add_demux (Job &job, Chain &frames, const DecodeOptions &options,
     std::optional<int> region)
 {
   Settings settings = shared_settings (options);
-  set_if (settings, "method", options.method);
+  settings.emplace_back ("method", options.method);
   frames.to ("queue").to ("codedexposure-demux", settings);
   GstElement *demux = frames.last ();
   job.counted = demux;
@@ -40,15 +37,11 @@ add_fusion (Job &job, Chain &frames, const DecodeOptions &options,
     std::optional<int> threads)
 {
   Settings settings = shared_settings (options);
-  settings.emplace_back ("quality", *options.fuse);
-  settings.emplace_back ("lookahead", 1);
-  if (options.refine)
-    settings.emplace_back ("refine", true);
-  set_if (settings, "full-well", options.full_well);
-  set_if (settings, "read-noise", options.read_noise);
-  set_if (settings, "range", options.range);
-  set_if (settings, "overlap", options.overlap);
-  set_if (settings, "threads", threads);
+  settings.insert (settings.end (),
+      {{"quality", options.fuse}, {"lookahead", 1}, {"refine", options.refine},
+          {"full-well", options.full_well}, {"read-noise", options.read_noise},
+          {"range", options.range}, {"overlap", options.overlap},
+          {"threads", threads}});
   frames.to ("queue", {{"max-size-buffers", 1}})
       .to ("codedexposure-fuse", settings);
   GstElement *fuse = frames.last ();

@@ -43,6 +43,53 @@ name_for (GstElement *pipeline, std::string_view factory)
   }
 }
 
+/* Reads @text into @value. Returns what it must be; empty: it is that. */
+std::string
+read_value (const std::string &text, GParamSpec *spec, GValue *value)
+{
+  if (!gst_value_deserialize_with_pspec (value, text.c_str (), spec))
+    return std::string ("a ") + g_type_name (spec->value_type);
+  GValue nearest = G_VALUE_INIT;
+  g_value_init (&nearest, spec->value_type);
+  g_value_copy (value, &nearest);
+  std::string rule;
+  if (g_param_value_validate (spec, &nearest)) {
+    const CharPtr limit (gst_value_serialize (&nearest));
+    const bool is_below =
+        gst_value_compare (value, &nearest) == GST_VALUE_LESS_THAN;
+    rule = (is_below ? "at least " : "at most ") + std::string (limit.get ());
+  }
+  g_value_unset (&nearest);
+  return rule;
+}
+
+/* A text is set as it is: only the parser of gst-launch-1.0 unescapes it. A
+ * value that GLib would replace by the default is an error; options that are
+ * not checked before have the names of their properties. */
+void
+set (GstElement *element, const char *property, const std::string &text)
+{
+  GObject *object = G_OBJECT (element);
+  GParamSpec *spec =
+      g_object_class_find_property (G_OBJECT_GET_CLASS (object), property);
+  if (!spec)
+    fail ("the element \"" + factory_of (element) + "\" has no property \"" +
+          property + "\"; install the version that this program needs");
+  if (spec->value_type == G_TYPE_STRING) {
+    g_object_set (object, property, text.c_str (), nullptr);
+    return;
+  }
+  GValue value = G_VALUE_INIT;
+  g_value_init (&value, spec->value_type);
+  const std::string rule = read_value (text, spec, &value);
+  if (rule.empty ())
+    g_object_set_property (object, property, &value);
+  g_value_unset (&value);
+  if (!rule.empty ())
+    usage_error (
+        "--" + std::string (property) + " must be " + rule + ", not " + text);
+}
+
 } // namespace
 
 GstElement *
@@ -58,7 +105,8 @@ Graph::add (const char *factory, const Settings &settings)
                             : "; run apt-get install " + package));
   }
   for (const Setting &setting : settings)
-    set (element, setting);
+    if (setting.value)
+      set (element, setting.name, *setting.value);
   gst_bin_add (GST_BIN (pipeline ()), element);
   return element;
 }
@@ -101,58 +149,6 @@ Graph::add_text (const std::string &description)
   g_object_set_data_full (
       G_OBJECT (bin), "description", g_strdup (text.c_str ()), g_free);
   return bin;
-}
-
-namespace
-{
-
-/* Reads @text into @value. Returns what it must be; empty: it is that. */
-std::string
-read_value (const std::string &text, GParamSpec *spec, GValue *value)
-{
-  if (!gst_value_deserialize_with_pspec (value, text.c_str (), spec))
-    return std::string ("a ") + g_type_name (spec->value_type);
-  GValue nearest = G_VALUE_INIT;
-  g_value_init (&nearest, spec->value_type);
-  g_value_copy (value, &nearest);
-  std::string rule;
-  if (g_param_value_validate (spec, &nearest)) {
-    const CharPtr limit (gst_value_serialize (&nearest));
-    const bool is_below =
-        gst_value_compare (value, &nearest) == GST_VALUE_LESS_THAN;
-    rule = (is_below ? "at least " : "at most ") + std::string (limit.get ());
-  }
-  g_value_unset (&nearest);
-  return rule;
-}
-
-} // namespace
-
-/* A text is set as it is: only the parser of gst-launch-1.0 unescapes it. A
- * value that GLib would replace by the default is an error; options that are
- * not checked before have the names of their properties. */
-void
-Graph::set (GstElement *element, const Setting &setting) const
-{
-  GObject *object = G_OBJECT (element);
-  GParamSpec *spec =
-      g_object_class_find_property (G_OBJECT_GET_CLASS (object), setting.name);
-  if (!spec)
-    fail ("the element \"" + factory_of (element) + "\" has no property \"" +
-          setting.name + "\"; install the version that this program needs");
-  if (spec->value_type == G_TYPE_STRING) {
-    g_object_set (object, setting.name, setting.value.c_str (), nullptr);
-    return;
-  }
-  GValue value = G_VALUE_INIT;
-  g_value_init (&value, spec->value_type);
-  const std::string rule = read_value (setting.value, spec, &value);
-  if (rule.empty ())
-    g_object_set_property (object, setting.name, &value);
-  g_value_unset (&value);
-  if (!rule.empty ())
-    usage_error ("--" + std::string (setting.name) + " must be " + rule +
-                 ", not " + setting.value);
 }
 
 namespace

@@ -19,11 +19,15 @@ namespace codedexposure::app
 
 /** A property of an element and its value. */
 struct Setting {
-  /** @p given  as gst-launch-1.0 takes it, in the C locale. */
+  /** @p given  as gst-launch-1.0 takes it, in the C locale. Without a value,
+   * the property stays as it is. */
   template <typename Value>
   Setting (const char *property, const Value &given) : name (property)
   {
-    if constexpr (std::is_same_v<Value, bool>)
+    if constexpr (requires { given.has_value (); }) {
+      if (given)
+        value = Setting (property, *given).value;
+    } else if constexpr (std::is_same_v<Value, bool>)
       value = given ? "true" : "false";
     else if constexpr (std::is_integral_v<Value>)
       value = std::to_string (given);
@@ -34,18 +38,9 @@ struct Setting {
   }
 
   const char *name;
-  std::string value;
+  std::optional<std::string> value;
 };
 using Settings = std::vector<Setting>;
-
-/** Appends the setting @p property if @p value is set. */
-template <typename T>
-void
-set_if (Settings &settings, const char *property, const std::optional<T> &value)
-{
-  if (value)
-    settings.emplace_back (property, *value);
-}
 
 class Chain;
 
@@ -67,7 +62,6 @@ public:
   /** The elements of @p description, as of gst-launch-1.0, in a bin whose free
    * pads are its own. Throws Failure. */
   GstElement *add_text (const std::string &description);
-  void set (GstElement *element, const Setting &setting) const;
 
   /** Links a pad of @p from, null: any that fits, to one of @p to. A pad that
    * comes later is linked when it comes. Throws Failure. */

@@ -33,9 +33,8 @@ write_recording (Job &job, Chain &chain, const std::string &file,
           {"max-size-buffers", frames_that_wait (style.rate)},
           {"max-size-bytes", room_in_memory ()}, {"max-size-time", 0}});
   GstElement *queue = chain.last ();
-  Settings settings{{"codec", style.codec}};
-  set_if (settings, "threads", style.threads);
-  chain.to ("codedexposure-recordmux", settings);
+  chain.to ("codedexposure-recordmux",
+      {{"codec", style.codec}, {"threads", style.threads}});
   GstElement *mux = chain.last ();
   if (style.live) {
     job.buffers.push_back (queue);

@@ -83,20 +83,6 @@ scene (
   return chain.to ("queue");
 }
 
-void
-add_camera_settings (Settings &settings, const SourceOptions &options)
-{
-  settings.emplace_back ("camera-name", *options.camera);
-  settings.emplace_back ("trigger", options.trigger.value_or ("dmd"));
-  set_if (settings, "exposure-time", options.exposure);
-  set_if (settings, "trigger-line", options.trigger_line);
-  set_if (settings, "trigger-edge", options.trigger_edge);
-  set_if (settings, "pixel-format", options.pixel_format);
-  set_if (settings, "features", options.features);
-  set_if (settings, "reconnect", options.reconnect);
-  set_if (settings, "bench", options.bench);
-}
-
 /* A camera that is not told how long to expose does what it was last set to.
  * The first frame, in whose exposure not all slots lie, is an error. It says
  * its exposure itself: asking the camera would hold it up. */
@@ -170,11 +156,11 @@ synchronise (
 {
   if (options.source && !options.device && !options.schedule)
     return;
-  Settings settings{{"schedule", options.schedule_text ()}};
-  set_if (settings, "device", options.device);
-  if (options.camera)
-    settings.emplace_back ("timestamp-at", "device-clock");
-  set_if (settings, "bench", options.bench);
+  const auto clock =
+      options.camera ? std::optional ("device-clock") : std::nullopt;
+  Settings settings{{"schedule", options.schedule_text ()},
+      {"device", options.device}, {"timestamp-at", clock},
+      {"bench", options.bench}};
   settings.insert (settings.end (), more.begin (), more.end ());
   chain.to ("dmdsync", settings);
 }
@@ -184,18 +170,12 @@ void
 simulate_camera (Job &job, const SourceOptions &options, const SourcePlan &plan,
     Chain &chain, const Settings &more)
 {
-  Settings settings{{"schedule", options.schedule_text ()}};
-  set_if (settings, "bench", options.bench);
-  set_if (settings, "psf-sigma", options.psf_sigma);
-  set_if (settings, "full-well", options.full_well);
-  set_if (settings, "read-noise", options.read_noise);
-  set_if (settings, "bits", options.bits);
-  set_if (settings, "gain", options.gain);
-  set_if (settings, "seed", options.seed);
-  set_if (settings, "shift-x", options.shift_x);
-  set_if (settings, "shift-y", options.shift_y);
-  set_if (settings, "rotation", options.rotation);
-  set_if (settings, "scale", options.scale);
+  Settings settings{{"schedule", options.schedule_text ()},
+      {"bench", options.bench}, {"psf-sigma", options.psf_sigma},
+      {"full-well", options.full_well}, {"read-noise", options.read_noise},
+      {"bits", options.bits}, {"gain", options.gain}, {"seed", options.seed},
+      {"shift-x", options.shift_x}, {"shift-y", options.shift_y},
+      {"rotation", options.rotation}, {"scale", options.scale}};
   settings.insert (settings.end (), more.begin (), more.end ());
   chain.to ("codedexposure-sim", settings);
   job.source = "the simulated bench";
@@ -212,11 +192,9 @@ simulated_cameras (Job &job, const SourceOptions &options,
   GstElement *light = scene (job, options, plan, pace).to ("tee").last ();
   Chain on = job.graph.from (light).to ("queue");
   Chain off = job.graph.from (light).to ("queue");
-  Settings dmd, beam{{"beam", "off"}};
-  set_if (dmd, "dmd", options.device);
-  set_if (beam, "dmd", options.device);
-  simulate_camera (job, second, plan, off, beam);
-  simulate_camera (job, options, plan, on, dmd);
+  simulate_camera (
+      job, second, plan, off, {{"beam", "off"}, {"dmd", options.device}});
+  simulate_camera (job, options, plan, on, {{"dmd", options.device}});
   return {std::move (on), std::move (off)};
 }
 
@@ -227,11 +205,17 @@ Chain
 camera_source (Job &job, const SourceOptions &options, const SourcePlan &plan)
 {
   constexpr int kBuffers = 150;
-  Settings settings;
-  add_camera_settings (settings, options);
-  if (!options.pixel_format && plan.bench && !plan.pixel_format.empty ())
-    settings.emplace_back ("pixel-format", plan.pixel_format);
-  Chain chain = job.graph.begin ("codedexposure-camerasrc", settings);
+  const bool is_measured = plan.bench && !plan.pixel_format.empty ();
+  Chain chain = job.graph.begin ("codedexposure-camerasrc",
+      {{"camera-name", options.camera},
+          {"trigger", options.trigger.value_or ("dmd")},
+          {"exposure-time", options.exposure},
+          {"trigger-line", options.trigger_line},
+          {"trigger-edge", options.trigger_edge},
+          {"pixel-format",
+              is_measured ? plan.pixel_format : options.pixel_format},
+          {"features", options.features}, {"reconnect", options.reconnect},
+          {"bench", options.bench}});
   gst_child_proxy_set (GST_CHILD_PROXY (chain.last ()),
       "source::num-arv-buffers", kBuffers, nullptr);
   job.camera = chain.last ();

@@ -31,9 +31,8 @@ void
 write_mkv (
     Job &job, Chain &chain, const std::string &name, const VideoStyle &style)
 {
-  Settings settings{{"codec", style.encoded ? "copy" : "ffv1"}};
-  set_if (settings, "threads", style.threads);
-  chain.to ("codedexposure-recordmux", settings);
+  chain.to ("codedexposure-recordmux",
+      {{"codec", style.encoded ? "copy" : "ffv1"}, {"threads", style.threads}});
   const auto frames = pad_of (chain.last (), "sink");
   write_file (job, chain, name, frames.get ());
 }
@@ -173,10 +172,7 @@ write_video (
 void
 add_view (Chain &chain, std::optional<int> bits, std::optional<int> white)
 {
-  Settings settings;
-  set_if (settings, "bits", bits);
-  set_if (settings, "white", white);
-  chain.to ("codedexposure-view", settings);
+  chain.to ("codedexposure-view", {{"bits", bits}, {"white", white}});
 }
 
 } // namespace codedexposure::app

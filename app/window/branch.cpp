@@ -50,9 +50,8 @@ add_pane (Chain chain, std::size_t index, std::optional<int> bits,
   pane.caption = kPanes[index].caption;
   pane.entry = add_latest (chain, name, waits);
   pane.late = add_latest (chain, name + "-late", waits);
-  Settings settings{{"qos", false}};
-  set_if (settings, "bits", bits);
-  pane.view = chain.to ("codedexposure-view", settings).last ();
+  pane.view =
+      chain.to ("codedexposure-view", {{"qos", false}, {"bits", bits}}).last ();
   pane.scale =
       chain.to ("videoscale", {{"add-borders", false}, {"qos", false}}).last ();
   pane.shown = chain.to ("capsfilter").last ();
@@ -155,12 +154,14 @@ WindowOptions::add_keeper (
   const auto in_ns = [] (double seconds) {
     return std::uint64_t (std::llround (1e9 * seconds));
   };
-  Settings settings{{"location", command}, {"length", in_ns (kRemembered)}};
-  set_if (settings, "event", keep_on);
+  std::optional<std::uint64_t> after;
   if (keep_after)
-    settings.emplace_back ("after", in_ns (*keep_after));
-  set_if (settings, "bits", bits);
-  return chain.to ("codedexposure-keep", settings).last ();
+    after = in_ns (*keep_after);
+  return chain
+      .to ("codedexposure-keep",
+          {{"location", command}, {"length", in_ns (kRemembered)},
+              {"event", keep_on}, {"after", after}, {"bits", bits}})
+      .last ();
 }
 
 std::string

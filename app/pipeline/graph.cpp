@@ -268,10 +268,10 @@ factory_of (gpointer object)
 }
 
 std::string
-text_property (GstElement *element, const std::string &property)
+text_property (gpointer object, const std::string &property)
 {
   gchar *text = nullptr;
-  g_object_get (element, property.c_str (), &text, nullptr);
+  g_object_get (object, property.c_str (), &text, nullptr);
   const CharPtr owned (text);
   return text ? text : "";
 }

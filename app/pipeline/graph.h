@@ -119,8 +119,8 @@ using gst::pad_of;
 /** The name of the factory of the element @p object; empty: it has none, or is
  * no element. */
 std::string factory_of (gpointer object);
-/** A property of @p element that is a text; empty: it is not set. */
-std::string text_property (GstElement *element, const std::string &property);
+/** A property of the GObject @p object that is a text; empty: it is not set. */
+std::string text_property (gpointer object, const std::string &property);
 
 /** The element to which a pad of @p element is linked when it comes; null:
  * none.

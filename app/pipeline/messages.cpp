@@ -252,11 +252,10 @@ has_property (GstObject *object, const char *name)
 std::string
 camera_of (GstObject *source)
 {
-  gchar *name = nullptr;
-  if (has_property (source, "camera-name"))
-    g_object_get (source, "camera-name", &name, nullptr);
-  const CharPtr owned (name);
-  return name ? std::string (" ") + name : "";
+  const std::string name = has_property (source, "camera-name")
+                               ? text_property (source, "camera-name")
+                               : "";
+  return name.empty () ? "" : " " + name;
 }
 
 bool
@@ -293,16 +292,14 @@ told (GstMessage *message)
 {
   const Told parts (message);
   const gchar *detail = added (parts.debug.get ());
-  gchar *file = nullptr;
   GstObject *source = GST_MESSAGE_SRC (message);
+  std::string name = GST_OBJECT_NAME (source);
+  if (const std::string camera = camera_of (source); !camera.empty ())
+    name = "camera" + camera;
   if (parts.error->domain == GST_RESOURCE_ERROR &&
       has_property (source, "location"))
-    g_object_get (source, "location", &file, nullptr);
-  const CharPtr owned (file);
-  const std::string camera = camera_of (source);
-  const std::string name = file               ? file
-                           : !camera.empty () ? "camera" + camera
-                                              : GST_OBJECT_NAME (source);
+    if (const auto file = text_property (source, "location"); !file.empty ())
+      name = file;
   if (GST_MESSAGE_TYPE (message) == GST_MESSAGE_INFO && detail)
     return name + ": " + detail;
   return name + ": " + parts.error->message +

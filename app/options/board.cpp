@@ -10,6 +10,7 @@
 #include "dmd/boards.h"
 #include "failure.h"
 #include "options/common.h"
+#include "pipeline/signals.h"
 
 namespace codedexposure::app
 {
@@ -98,12 +99,8 @@ stop_at_signals ()
 {
   static sigset_t signals;
   sigemptyset (&signals);
-  sigaddset (&signals, SIGINT);
-  sigaddset (&signals, SIGTERM);
-  struct sigaction hangup = {};
-  if (sigaction (SIGHUP, nullptr, &hangup) == 0 &&
-      hangup.sa_handler != SIG_IGN) // nohup
-    sigaddset (&signals, SIGHUP);
+  for (const int number : ending_signals ())
+    sigaddset (&signals, number);
   pthread_sigmask (SIG_BLOCK, &signals, nullptr);
   static std::stop_source source;
   static const std::jthread thread ([] (const std::stop_token &quit) {

@@ -3,7 +3,11 @@
 #pragma once
 
 #include <chrono>
+#include <cstdio>
 #include <string>
+#include <utility>
+
+#include <unistd.h>
 
 namespace codedexposure::app
 {
@@ -14,15 +18,45 @@ class Status
 {
 public:
   /** @p what  prefix of every line. */
-  Status (std::string what, bool verbose);
-  void progress (const std::string &text);
-  void line (const std::string &text);
+  Status (std::string what, bool verbose)
+      : what_ (std::move (what)), terminal_ (isatty (STDERR_FILENO) != 0),
+        verbose_ (verbose)
+  {
+  }
+
+  void progress (const std::string &text)
+  {
+    if (terminal_) {
+      std::fprintf (stderr, "\r%s: %s\033[K", what_.c_str (), text.c_str ());
+      open_ = true;
+    } else if (verbose_ && Clock::now () >= next_) {
+      std::fprintf (stderr, "%s: %s\n", what_.c_str (), text.c_str ());
+      next_ = Clock::now () + std::chrono::seconds (10);
+    }
+  }
+
+  void line (const std::string &text)
+  {
+    end_progress ();
+    std::fprintf (stderr, "%s: %s\n", what_.c_str (), text.c_str ());
+  }
+
   /** A line on stdout. */
-  void output (const std::string &text);
+  void output (const std::string &text)
+  {
+    end_progress ();
+    std::printf ("%s: %s\n", what_.c_str (), text.c_str ());
+    std::fflush (stdout);
+  }
 
 private:
   using Clock = std::chrono::steady_clock;
-  void end_progress ();
+
+  void end_progress ()
+  {
+    if (std::exchange (open_, false))
+      std::fprintf (stderr, "\r\033[K");
+  }
 
   std::string what_;
   bool terminal_, verbose_;

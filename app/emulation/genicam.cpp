@@ -208,28 +208,25 @@ extra_features ()
   return features;
 }
 
-Result<std::unique_ptr<GenicamFile>>
-GenicamFile::write (const GigeCameraOptions &options)
+Result<std::string>
+write_description (const GigeCameraOptions &options)
 {
   ASSIGN_OR_RETURN (const std::string xml, describe (options));
-  gchar *path = nullptr;
+  gchar *name = nullptr;
   const int descriptor =
-      g_file_open_tmp ("codedexposure-XXXXXX.xml", &path, nullptr);
+      g_file_open_tmp ("codedexposure-XXXXXX.xml", &name, nullptr);
   if (descriptor < 0)
     return Error{"no temporary file can be written for the description of the "
                  "simulated camera"};
-  std::unique_ptr<GenicamFile> file (new GenicamFile (path));
-  g_free (path);
+  const std::string path = name;
+  g_free (name);
   g_close (descriptor, nullptr);
   if (!g_file_set_contents (
-          file->path ().c_str (), xml.data (), gssize (xml.size ()), nullptr))
-    return Error{"cannot write " + file->path ()};
-  return file;
-}
-
-GenicamFile::~GenicamFile ()
-{
-  g_unlink (path_.c_str ());
+          path.c_str (), xml.data (), gssize (xml.size ()), nullptr)) {
+    g_unlink (path.c_str ());
+    return Error{"cannot write " + path};
+  }
+  return path;
 }
 
 } // namespace codedexposure::genicam

@@ -3,7 +3,6 @@
  * Aravis' fake camera does not have. */
 #pragma once
 
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -35,20 +34,9 @@ struct ExtraFeature {
 };
 const std::vector<ExtraFeature> &extra_features ();
 
-/** A temporary file with the description: that of Aravis, with formats, lines
- * and features of this camera. */
-class GenicamFile
-{
-public:
-  static Result<std::unique_ptr<GenicamFile>> write (
-      const GigeCameraOptions &options);
-  ~GenicamFile ();
-  const std::string &path () const { return path_; }
-
-private:
-  explicit GenicamFile (std::string path) : path_ (std::move (path)) {}
-
-  const std::string path_;
-};
+/** Writes a temporary file with the description: that of Aravis, with formats,
+ * lines and features of this camera. Returns its name; the caller deletes it.
+ */
+Result<std::string> write_description (const GigeCameraOptions &options);
 
 } // namespace codedexposure::genicam

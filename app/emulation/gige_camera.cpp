@@ -15,6 +15,7 @@
 #include <vector>
 
 #include <arv.h>
+#include <glib/gstdio.h>
 
 #include "base/packed_mono.h"
 #include "base/pixels.h"
@@ -76,14 +77,15 @@ struct SimulatedCamera final : public GigeCamera {
 
   Result<void> start (GigeCameraOptions with, Expose light)
   {
-    ASSIGN_OR_RETURN (const auto description, GenicamFile::write (with));
+    ASSIGN_OR_RETURN (const std::string description, write_description (with));
     options = std::move (with);
     expose = std::move (light);
     faults = options.faults;
     random.seed (options.seed);
     picture = Image<std::uint16_t> (options.width, options.height);
     server.reset (arv_gv_fake_camera_new_full (options.address.c_str (),
-        options.serial.c_str (), description->path ().c_str ()));
+        options.serial.c_str (), description.c_str ()));
+    g_unlink (description.c_str ());
     if (!server || !arv_gv_fake_camera_is_running (server.get ()))
       return Error{"no camera can be at " + in_quotes (options.address) +
                    ", which is no address of this machine"};

@@ -11,16 +11,6 @@ namespace codedexposure::app
 
 using namespace gst;
 
-Graph::Graph ()
-    : pipeline_ (GST_ELEMENT (gst_object_ref_sink (gst_pipeline_new (nullptr))))
-{
-}
-
-Graph::~Graph ()
-{
-  gst_element_set_state (pipeline (), GST_STATE_NULL);
-}
-
 namespace
 {
 
@@ -228,21 +218,6 @@ Chain
 Graph::from (GstElement *element, const char *pad)
 {
   return {*this, element, pad};
-}
-
-Chain &
-Chain::to (GstElement *element, const char *pad)
-{
-  graph_->link (last_, std::exchange (pad_, nullptr), element, pad);
-  last_ = element;
-  return *this;
-}
-
-Chain &
-Chain::queue (int frames, const char *leaky)
-{
-  return to ("queue", {{"max-size-buffers", frames}, {"max-size-bytes", 0},
-                          {"max-size-time", 0}, {"leaky", leaky}});
 }
 
 void

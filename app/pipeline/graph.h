@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <gst/gst.h>
@@ -49,8 +50,12 @@ class Chain;
 class Graph
 {
 public:
-  Graph ();
-  ~Graph ();
+  Graph ()
+      : pipeline_ (
+            GST_ELEMENT (gst_object_ref_sink (gst_pipeline_new (nullptr))))
+  {
+  }
+  ~Graph () { gst_element_set_state (pipeline (), GST_STATE_NULL); }
   Graph (const Graph &) = delete;
   Graph &operator= (const Graph &) = delete;
 
@@ -92,14 +97,23 @@ public:
     return to (graph_->add (factory, settings));
   }
   /** Links an element of the pipeline, at its pad @p pad if named. */
-  Chain &to (GstElement *element, const char *pad = nullptr);
+  Chain &to (GstElement *element, const char *pad = nullptr)
+  {
+    graph_->link (last_, std::exchange (pad_, nullptr), element, pad);
+    last_ = element;
+    return *this;
+  }
   /** A filter for these caps. */
   Chain &caps (const std::string &caps)
   {
     return to ("capsfilter", {{"caps", caps}});
   }
   /** A queue that holds @p frames buffers of any size and time. */
-  Chain &queue (int frames, const char *leaky = "no");
+  Chain &queue (int frames, const char *leaky = "no")
+  {
+    return to ("queue", {{"max-size-buffers", frames}, {"max-size-bytes", 0},
+                            {"max-size-time", 0}, {"leaky", leaky}});
+  }
 
   GstElement *last () const { return last_; }
   Graph &graph () const { return *graph_; }

@@ -123,9 +123,8 @@ struct Job {
   std::string schedule;
   /** How the run ended, by how its frames ended it; null: as they did. */
   std::function<Exit (const RunResult &)> judge;
+  /** Shows the run, which an error of its sink ends well once it is closed. */
   std::unique_ptr<Viewer> window;
-  /** An error of an element that is shown in a window ends the run well. */
-  bool has_window = false;
 };
 
 /** Plays @p job until its end and publishes its outputs; prints progress,

@@ -245,7 +245,7 @@ Run::try_to_connect_again (std::string_view kind, const GError *error)
 bool
 Run::is_closed_window (GstObject *source, const GError *error) const
 {
-  return job_.has_window && GST_IS_ELEMENT (source) &&
+  return job_.window && GST_IS_ELEMENT (source) &&
          GST_OBJECT_FLAG_IS_SET (source, GST_ELEMENT_FLAG_SINK) &&
          g_error_matches (
              error, GST_RESOURCE_ERROR, GST_RESOURCE_ERROR_NOT_FOUND) &&

@@ -55,8 +55,10 @@ info_in (GstPadProbeInfo *probed)
 
 } // namespace
 
-Window::Window (WindowBranch branch, GstPad *coded, Setup setup)
-    : size_ (branch.size), setup_ (std::move (setup))
+Window::Window (
+    const Job &job, WindowBranch branch, std::unique_ptr<Player> player)
+    : size_ (branch.size), job_ (job), player_ (std::move (player)),
+      room_ (find_screen ().room ())
 {
   panel_at_ = pad_of (branch.overlay, "sink");
   for (WindowPane &part : branch.panes) {
@@ -70,7 +72,8 @@ Window::Window (WindowBranch branch, GstPad *coded, Setup setup)
     panes_.push_back (std::move (pane));
   }
   /* The layout is set before the caps reach the panes. */
-  add_probe (coded, GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
+  add_probe (pad_of (job.counted, "sink").get (),
+      GST_PAD_PROBE_TYPE_EVENT_DOWNSTREAM,
       [this] (GstPad *, GstPadProbeInfo *info) {
         if (const auto camera = info_in (info))
           set_layout (*camera);
@@ -99,8 +102,8 @@ Window::begin (Calls calls)
                    "and the network to it, and start again");
     calls_.end ();
   });
-  if (setup_.player)
-    return setup_.player->begin (calls_.pipeline, calls_.failed);
+  if (player_)
+    return player_->begin (calls_.pipeline, calls_.failed);
   on_signal_ = g_unix_signal_add (
       SIGUSR1,
       [] (gpointer self) {
@@ -114,7 +117,7 @@ void
 Window::finish ()
 {
   /* An element that ends says what it has kept. */
-  if (setup_.keeper)
+  if (job_.keeper)
     while (const MessagePtr message = next_message (
                calls_.pipeline, GST_MESSAGE_ELEMENT | GST_MESSAGE_WARNING))
       take_kept (message.get ());
@@ -123,8 +126,8 @@ Window::finish ()
   if (snapshot_wanted_)
     calls_.failed ("no snapshot was written: the window closed before its next "
                    "picture; press S, and Q when the file is named");
-  if (setup_.player)
-    setup_.player->finish ();
+  if (player_)
+    player_->finish ();
 }
 
 void
@@ -160,7 +163,9 @@ Window::set_queues (const Pane &pane, const GstVideoInfo &picture)
   }
   if (rate <= 0 || camera <= 0)
     return;
-  const double waiting = 2 * rate * (1 / camera + 1e-9 * double (setup_.delay));
+  const double waiting =
+      2 * rate *
+      (1 / camera + 1e-9 * double (job_.times.shift_to.value_or (0)));
   const int most = std::max (kFewest, int (std::ceil (waiting - 1e-6)));
   for (GstElement *queue : {pane.part.entry, pane.part.late})
     g_object_set (queue, "max-size-buffers", guint (most), nullptr);
@@ -170,7 +175,7 @@ void
 Window::set_layout (const GstVideoInfo &camera)
 {
   const WindowLayout layout = WindowLayout::fit (
-      {camera.width, camera.height}, int (panes_.size ()), setup_.room);
+      {camera.width, camera.height}, int (panes_.size ()), room_);
   for (const auto &pane : panes_)
     g_object_set (pane->part.mixed.get (), "xpos",
         layout.left (int (pane->index)), "ypos", WindowLayout::kCaption,
@@ -312,13 +317,8 @@ add_window (Job &job, const std::vector<Chain> &sources,
     branch.panes[kSubframes].caption = played->pictures;
   if (!job.options.print)
     need_screen (branch);
-  job.has_window = true;
-  job.window = std::make_unique<Window> (std::move (branch),
-      pad_of (job.counted, "sink").get (),
-      Window::Setup{find_screen ().room (), job.times.shift_to.value_or (0),
-          job.command, job.command + ": " + job.source, job.keeper, job.camera,
-          job.exposures,
-          played ? std::make_unique<Player> (*std::move (played)) : nullptr});
+  job.window = std::make_unique<Window> (job, std::move (branch),
+      played ? std::make_unique<Player> (*std::move (played)) : nullptr);
 }
 
 } // namespace codedexposure::app

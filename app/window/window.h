@@ -34,21 +34,9 @@ namespace codedexposure::app
 class Window : public Viewer
 {
 public:
-  struct Setup {
-    Extent room;                  ///< for the window, in pixels
-    GstClockTime delay = 0;       ///< after which frames are shown
-    std::string name;             ///< of the command, in the names of snapshots
-    std::string title;            ///< of the window
-    GstElement *keeper = nullptr; ///< remembers frames; null: nothing does
-    /** Whose gain and exposure keys change; null: none. */
-    GstElement *camera = nullptr;
-    Between exposures = {}; ///< that are allowed, us
-    /** Moves in a recording; null: the window looks at what comes. */
-    std::unique_ptr<Player> player = nullptr;
-  };
-
-  /** @p coded  pad whose caps are those of the coded frames. */
-  Window (WindowBranch branch, GstPad *coded, Setup setup);
+  /** @p job     has what is shown, and outlives this.
+   * @p player  moves in a recording; null: the window looks at what comes. */
+  Window (const Job &job, WindowBranch branch, std::unique_ptr<Player> player);
   ~Window () override;
   Window (const Window &) = delete;
   Window &operator= (const Window &) = delete;
@@ -109,8 +97,10 @@ private:
   void take_snapshot (cairo_t *cairo, const Scene &scene);
 
   GstElement *const size_; // of the pipeline
-  const Setup setup_;
-  Calls calls_; // constant while the pipeline plays
+  const Job &job_;
+  const std::unique_ptr<Player> player_;
+  const Extent room_; // for the window, in pixels
+  Calls calls_;       // constant while the pipeline plays
   std::vector<std::unique_ptr<Pane>> panes_; // constant
   Snapshots snapshots_;
   gst::ObjectPtr<GstPad> panel_at_; // where it is drawn

@@ -50,11 +50,12 @@ Window::on_draw (
     GstElement *overlay, cairo_t *cairo, guint64 time, guint64, gpointer self)
 {
   auto *window = static_cast<Window *> (self);
+  const Job &job = window->job_;
   /* Sinks for a screen show it as the title of their window. */
   if (!std::exchange (window->has_title_, true))
     gst_pad_push_event (pad_of (overlay, "src").get (),
-        gst_event_new_tag (gst_tag_list_new (
-            GST_TAG_TITLE, window->setup_.title.c_str (), nullptr)));
+        gst_event_new_tag (gst_tag_list_new (GST_TAG_TITLE,
+            (job.command + ": " + job.source).c_str (), nullptr)));
   /* A seek begins another segment, whose times do not count from 0. */
   window->draw (cairo, view_times_of (window->panel_at_.get (), time).running);
 }
@@ -70,7 +71,7 @@ bool
 Window::is_wanted (const Shown &subframe) const
 {
   return subframe.meta && GST_CLOCK_TIME_IS_VALID (subframe.stream_time) &&
-         setup_.player->is_wanted (Nanoseconds (subframe.stream_time),
+         player_->is_wanted (Nanoseconds (subframe.stream_time),
              std::max (subframe.meta->subframe, 0));
 }
 
@@ -122,7 +123,7 @@ Window::scene_at (ViewTime time)
   const Shown *subframe = scene.shown[kSubframes].get ();
   scene.snapshot = snapshot_wanted_ && subframe && coded &&
                    (!scene.live || is_pair (*subframe, *coded)) &&
-                   (!setup_.player || is_wanted (*subframe));
+                   (!player_ || is_wanted (*subframe));
   snapshot_wanted_ &= !scene.snapshot;
   scene.text = lines (subframe, coded, time);
   return scene;
@@ -156,8 +157,8 @@ Window::draw (cairo_t *cairo, ViewTime time)
     take_snapshot (cairo, scene);
   if (scene.helps) {
     if (!help_)
-      help_ = paint_sheet (setup_.player ? Player::keys_of ()
-                                         : WindowOptions::keys_of (setup_.name),
+      help_ = paint_sheet (
+          player_ ? Player::keys_of () : WindowOptions::keys_of (job_.command),
           {scene.layout.size ().width, scene.layout.pane.height});
     paint_over (cairo, help_.get ());
   }
@@ -171,14 +172,14 @@ Window::draw_texts (cairo_t *cairo, const Scene &scene, ViewTime time)
   const bool other = painted_subframe_ != subframe;
   /* No picture follows that would be drawn later. */
   const bool stays =
-      setup_.player && (setup_.player->is_paused () ||
-                           (subframe && setup_.player->is_last (Nanoseconds (
-                                            subframe->stream_time))));
+      player_ &&
+      (player_->is_paused () ||
+          (subframe && player_->is_last (Nanoseconds (subframe->stream_time))));
   if (!panel_ || scene.snapshot || (!scene.live && other) || stays ||
       time < painted_ || time >= painted_ + kPanelPeriod) {
     panel_ = paint_panel (scene.layout, scene.text,
         coded ? coded->exposure.get () : nullptr,
-        setup_.player ? Player::short_keys () : kKeys);
+        player_ ? Player::short_keys () : kKeys);
     if (!captions_ || written_ != scene.captions)
       captions_ = paint_captions (scene.layout, scene.captions);
     written_ = scene.captions;
@@ -209,9 +210,9 @@ std::vector<PanelLine>
 Window::lines (const Shown *subframe, const Shown *coded, ViewTime time) const
 {
   std::vector<PanelLine> lines;
-  if (setup_.player)
-    lines.push_back ({setup_.player->line (
-        subframe ? Nanoseconds (subframe->stream_time) : 0)});
+  if (player_)
+    lines.push_back (
+        {player_->line (subframe ? Nanoseconds (subframe->stream_time) : 0)});
   else if (replay_.is_live ())
     lines.push_back ({"live"});
   else {
@@ -254,7 +255,7 @@ void
 Window::take_snapshot (cairo_t *cairo, const Scene &scene)
 {
   const Shown &subframe = *scene.shown[kSubframes];
-  std::string name = setup_.name;
+  std::string name = job_.command;
   if (subframe.meta)
     name += format ("-frame%06" G_GUINT64_FORMAT "-slot%d",
         subframe.meta->frame, std::max (subframe.meta->subframe, 0));

@@ -74,8 +74,8 @@ Window::watch_keys (GstElement *overlay)
 void
 Window::keep ()
 {
-  if (setup_.keeper)
-    g_object_set (setup_.keeper, "keep", TRUE, nullptr);
+  if (job_.keeper)
+    g_object_set (job_.keeper, "keep", TRUE, nullptr);
 }
 
 /* Whether the message is about what is kept. */
@@ -86,7 +86,7 @@ Window::take_kept (GstMessage *message)
     keep ();
     return true;
   }
-  if (GST_MESSAGE_SRC (message) != GST_OBJECT (setup_.keeper))
+  if (GST_MESSAGE_SRC (message) != GST_OBJECT (job_.keeper))
     return false;
   if (const auto kept = parse_message<Kept> (message))
     calls_.wrote ({kept->location},
@@ -105,25 +105,25 @@ bool
 Window::take (GstMessage *message)
 {
   GstEvent *parsed = nullptr;
-  if (setup_.keeper && take_kept (message))
+  if (job_.keeper && take_kept (message))
     return true;
   if (gst_message_has_name (message, kResized)) {
-    if (setup_.player)
-      setup_.player->redraw ();
+    if (player_)
+      player_->redraw ();
     return true;
   }
   if (gst_navigation_message_get_type (message) !=
           GST_NAVIGATION_MESSAGE_EVENT ||
       !gst_navigation_message_parse_event (message, &parsed))
-    return setup_.player && setup_.player->take (message);
+    return player_ && player_->take (message);
   const EventPtr event (parsed);
   const gchar *key = nullptr;
   if (gst_navigation_event_get_type (parsed) ==
       GST_NAVIGATION_EVENT_KEY_PRESS) {
     if (gst_navigation_event_parse_key_event (parsed, &key) && key)
       press (key);
-  } else if (take_mouse (parsed) && setup_.player)
-    setup_.player->redraw ();
+  } else if (take_mouse (parsed) && player_)
+    player_->redraw ();
   return true;
 }
 
@@ -210,12 +210,12 @@ Window::press (const std::string &key)
     return;
   }
   if (press_look (key)) {
-    if (setup_.player)
-      setup_.player->redraw ();
+    if (player_)
+      player_->redraw ();
     return;
   }
-  if (setup_.player)
-    setup_.player->press (key);
+  if (player_)
+    player_->press (key);
   else if (is_key (key, {"k"}))
     keep ();
   else if (is_key (
@@ -309,13 +309,13 @@ Window::stretch_tones ()
 void
 Window::turn_camera (const std::string &key)
 {
-  if (!setup_.camera)
+  if (!job_.camera)
     return;
   const int steps = is_key (key, {"Up", "Prior", "Page_Up"}) ? 1 : -1;
   const auto turned =
       is_key (key, {"Up", "Down"})
-          ? change_gain (setup_.camera, steps)
-          : change_exposure (setup_.camera, steps, setup_.exposures);
+          ? change_gain (job_.camera, steps)
+          : change_exposure (job_.camera, steps, job_.exposures);
   calls_.told (turned ? *turned : "error: " + turned.error ().message);
 }
 

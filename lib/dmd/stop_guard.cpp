@@ -27,25 +27,6 @@ using namespace std::chrono_literals;
 
 constexpr char kRuns = '1', kStands = '0';
 
-/** Owns what posix_spawn () is told. */
-struct SpawnSettings {
-  SpawnSettings ()
-  {
-    posix_spawn_file_actions_init (&files);
-    posix_spawnattr_init (&attributes);
-  }
-  ~SpawnSettings ()
-  {
-    posix_spawn_file_actions_destroy (&files);
-    posix_spawnattr_destroy (&attributes);
-  }
-  SpawnSettings (const SpawnSettings &) = delete;
-  SpawnSettings &operator= (const SpawnSettings &) = delete;
-
-  posix_spawn_file_actions_t files;
-  posix_spawnattr_t attributes;
-};
-
 const char *
 tool_path ()
 {
@@ -58,17 +39,23 @@ tool_path ()
 int
 spawn_tool (const std::string &device, int words, pid_t &process)
 {
-  SpawnSettings settings;
-  posix_spawn_file_actions_adddup2 (&settings.files, words, STDIN_FILENO);
-  posix_spawn_file_actions_addopen (
-      &settings.files, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-  posix_spawn_file_actions_addclosefrom_np (&settings.files, STDERR_FILENO + 1);
-  posix_spawnattr_setflags (&settings.attributes, POSIX_SPAWN_SETSID);
   std::string tool = tool_path (), dmd = "dmd", guard = "guard", board = device;
   char *const arguments[] = {
       tool.data (), dmd.data (), guard.data (), board.data (), nullptr};
-  return posix_spawn (&process, tool.c_str (), &settings.files,
-      &settings.attributes, arguments, environ);
+  posix_spawn_file_actions_t files;
+  posix_spawn_file_actions_init (&files);
+  posix_spawn_file_actions_adddup2 (&files, words, STDIN_FILENO);
+  posix_spawn_file_actions_addopen (
+      &files, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_addclosefrom_np (&files, STDERR_FILENO + 1);
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init (&attributes);
+  posix_spawnattr_setflags (&attributes, POSIX_SPAWN_SETSID);
+  const int code = posix_spawn (
+      &process, tool.c_str (), &files, &attributes, arguments, environ);
+  posix_spawn_file_actions_destroy (&files);
+  posix_spawnattr_destroy (&attributes);
+  return code;
 }
 
 Result<void>

@@ -10,16 +10,22 @@
 namespace codedexposure::fuse
 {
 
+/** Thrown when a stop was requested; Fuser turns it into
+ * ErrorCode::cancelled. */
+struct Stopped {
+};
+
 /** Who computes a frame, and what can end it early. */
 struct Task {
   Workers &workers;
   std::stop_token stop;
 
-  /** Workers::run (). */
+  /** Workers::run (); throws Stopped when it was stopped. */
   template <typename Use>
-  bool run (int parts, const Use &use) const
+  void run (int parts, const Use &use) const
   {
-    return workers.run (parts, use, stop);
+    if (!workers.run (parts, use, stop))
+      throw Stopped ();
   }
 };
 
@@ -31,16 +37,16 @@ struct Band {
 
 /** Calls use (band) for all of @p rows rows, in any order, with at least
  * @p min_rows at a time: all of them if there is one thread, as neighbouring
- * bands compute some rows twice. False when it was stopped. */
+ * bands compute some rows twice. */
 template <typename Use>
-bool
+void
 run_bands (const Task &task, int rows, int min_rows, const Use &use)
 {
   constexpr int kForEachThread = 2;
   const int threads = task.workers.count ();
   const int bands = threads == 1 ? 1 : kForEachThread * threads;
   const int height = std::max ((rows + bands - 1) / bands, min_rows);
-  return task.run ((rows + height - 1) / height, [&] (int part, int worker) {
+  task.run ((rows + height - 1) / height, [&] (int part, int worker) {
     const int first = part * height;
     use (Band{first, std::min (first + height, rows), worker});
   });

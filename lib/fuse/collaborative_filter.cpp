@@ -132,19 +132,18 @@ CollaborativeFilter::shrink_strip (const Step &step, int strip, float *scratch)
 
 /* Every other strip first, then those between: no two workers add to the same
  * pixel, and each pixel's sum has the same order with any number of them. */
-bool
+void
 CollaborativeFilter::shrink (const Step &step, const Task &task)
 {
   const int rows = (height_ + 2 * kBorder - kBlock - step.shift_y) / kBlockStep;
   const int strips = rows / kStripBlocks + 1;
   for (const int odd : {0, 1})
-    if (!task.run ((strips + 1 - odd) / 2, [&] (int part, int worker) {
-          shrink_strip (
-              step, 2 * part + odd, scratch_[std::size_t (worker)].data ());
-        }))
-      return false;
+    task.run ((strips + 1 - odd) / 2, [&] (int part, int worker) {
+      shrink_strip (
+          step, 2 * part + odd, scratch_[std::size_t (worker)].data ());
+    });
   const int height = height_ + 2 * kBorder;
-  return task.run ((height + kStripRows - 1) / kStripRows, [&] (int part, int) {
+  task.run ((height + kStripRows - 1) / kStripRows, [&] (int part, int) {
     update_rows (
         step, part * kStripRows, std::min (height, (part + 1) * kStripRows));
   });
@@ -190,7 +189,7 @@ CollaborativeFilter::correct_rows (int first, int end,
   }
 }
 
-bool
+void
 CollaborativeFilter::run (const Field &coded, const Field *partner,
     double noise, std::span<Field> slots, const Task &task)
 {
@@ -221,12 +220,10 @@ CollaborativeFilter::run (const Field &coded, const Field *partner,
     const double threshold =
         first * std::pow (last / first,
                     std::pow (double (i) / (kIterations - 1), kSlowing));
-    if (!shrink (
-            {(i / 2 + 2 * i) % kBlockStep, i % kBlockStep, float (threshold),
+    shrink ({(i / 2 + 2 * i) % kBlockStep, i % kBlockStep, float (threshold),
                 i < kIterations - kLastIterations ? kStep : 1.0f,
                 towards_partner (threshold)},
-            task))
-      return false;
+        task);
   }
   for (std::size_t s = 0; s < slots.size (); s++) {
     for (int y = 0; y < height_; y++) {
@@ -235,7 +232,6 @@ CollaborativeFilter::run (const Field &coded, const Field *partner,
         row[x] += kShare * (light_[s][place (x, y)] - row[x]);
     }
   }
-  return true;
 }
 
 } // namespace codedexposure::fuse

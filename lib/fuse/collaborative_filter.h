@@ -32,9 +32,8 @@ public:
   /** Improves @p slots, an estimate of the light of each slot, by @p coded. The
    * result does not depend on the number of workers.
    * @p partner  null, or what the slots are to make in the partner.
-   * @p noise    standard deviation of the coded pixels' noise, grey levels.
-   * @return     false when it was stopped. */
-  bool run (const Field &coded, const Field *partner, double noise,
+   * @p noise    standard deviation of the coded pixels' noise, grey levels. */
+  void run (const Field &coded, const Field *partner, double noise,
       std::span<Field> slots, const Task &task);
 
 private:
@@ -43,7 +42,7 @@ private:
   std::size_t place (int x, int y) const;
   void split (const Field &field, std::vector<float> &plane) const;
   struct Step;
-  bool shrink (const Step &step, const Task &task);
+  void shrink (const Step &step, const Task &task);
   void shrink_strip (const Step &step, int strip, float *scratch);
   void update_rows (const Step &step, int first, int end);
   void correct_rows (int first, int end, const Observation &observation,

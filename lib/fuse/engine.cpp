@@ -247,7 +247,7 @@ Engine::blend_static (const StaticPixels::Found &still)
 }
 
 /* Whole frames, for the stages that look around. */
-bool
+void
 Engine::fill_light (
     const CodedFrames &frames, const Seen &seen, const Task &task)
 {
@@ -259,44 +259,40 @@ Engine::fill_light (
   };
   if (linear_)
     return linear_->run (frames, seen.predicted, seen.still, keep, task);
-  if (!motion_->run (frames, light_, misfit_, task))
-    return false;
+  motion_->run (frames, light_, misfit_, task);
   if (collaborative_) {
-    if (!fit_partner (frames, task, &made_in_partner_))
-      return false;
-    if (!collaborative_->run (frames.now->light,
-            frames.has_partner () ? &made_in_partner_ : nullptr,
-            typical_noise (), light_, task))
-      return false;
+    fit_partner (frames, task, &made_in_partner_);
+    collaborative_->run (frames.now->light,
+        frames.has_partner () ? &made_in_partner_ : nullptr, typical_noise (),
+        light_, task);
   }
   blend_static (seen.still);
-  return fit_partner (frames, task);
+  fit_partner (frames, task);
 }
 
 /* What the network makes does not add up to what the partner saw. */
-bool
+void
 Engine::fill (const CodedFrames &frames, const Seen &seen, bool deviations,
     const Task &task)
 {
-  if (!fill_light (frames, seen, task))
-    return false;
-  return !refiner_ || (refiner_->run (frames, seen.still.weight, light_,
-                           deviations ? &deviations_ : nullptr, task) &&
-                          fit_partner (frames, task));
+  fill_light (frames, seen, task);
+  if (!refiner_)
+    return;
+  refiner_->run (frames, seen.still.weight, light_,
+      deviations ? &deviations_ : nullptr, task);
+  fit_partner (frames, task);
 }
 
 /* Where the partner is not known, the first camera is all that there is. */
-bool
+void
 Engine::fill_clipped (const CodedFrames &frames, const Seen &seen,
     bool deviations, const Task &task)
 {
-  if (!fill (frames.of_first (), seen, deviations, task))
-    return false;
+  fill (frames.of_first (), seen, deviations, task);
   std::swap (light_, alone_);
   std::swap (deviations_, alone_deviations_);
-  const auto *predicted = predictions_->run (frames, task);
-  if (!predicted || !fill (frames, {*predicted, seen.still}, deviations, task))
-    return false;
+  fill (
+      frames, {predictions_->run (frames, task), seen.still}, deviations, task);
   const auto restore = [&] (std::vector<Field> &to,
                            const std::vector<Field> &from) {
     for (std::size_t s = 0; s < to.size (); s++)
@@ -310,16 +306,15 @@ Engine::fill_clipped (const CodedFrames &frames, const Seen &seen,
   };
   restore (light_, alone_);
   restore (deviations_, alone_deviations_);
-  return true;
 }
 
-bool
+void
 Engine::fit_partner (const CodedFrames &frames, const Task &task, Field *made)
 {
   if (!frames.has_partner ())
-    return true;
+    return;
   constexpr int kMinRows = 16;
-  return run_bands (task, size_.height, kMinRows, [&] (const Band &band) {
+  run_bands (task, size_.height, kMinRows, [&] (const Band &band) {
     PartnerFit::Room room (*partner_fit_);
     std::vector<float *> rows (light_.size ());
     for (int y = band.first; y < band.end; y++) {
@@ -333,34 +328,28 @@ Engine::fit_partner (const CodedFrames &frames, const Task &task, Field *made)
   });
 }
 
-std::optional<Engine::Seen>
+Engine::Seen
 Engine::look (const CodedFrames &frames, const Task &task)
 {
   plan_->stop = task.stop;
-  const auto *predicted =
+  const auto &predicted =
       predictions_->run (frames.clipped () ? frames.of_first () : frames, task);
-  if (!predicted)
-    return {};
-  const auto still = static_pixels_->take (frames, predicted->unrepeated, task);
-  if (!still)
-    return {};
-  return Seen{*predicted, *still};
+  return {predicted, static_pixels_->take (frames, predicted.unrepeated, task)};
 }
 
-bool
+void
 Engine::fuse_frame (const CodedFrames &frames, const RowSink &sink,
     const Task &task, const Uncertainty::Sink &deviations)
 {
-  const auto seen = look (frames, task);
-  if (!seen)
-    return false;
+  const Seen seen = look (frames, task);
   const bool clipped = frames.clipped ();
   if (linear_ && !refiner_ && !deviations && !clipped)
-    return linear_->run (frames, seen->predicted, seen->still, sink, task);
+    return linear_->run (frames, seen.predicted, seen.still, sink, task);
   const bool wanted = bool (deviations);
-  if (clipped ? !fill_clipped (frames, *seen, wanted, task)
-              : !fill (frames, *seen, wanted, task))
-    return false;
+  if (clipped)
+    fill_clipped (frames, seen, wanted, task);
+  else
+    fill (frames, seen, wanted, task);
   std::vector<const float *> rows (light_.size ());
   for (int y = 0; y < size_.height; y++) {
     for (std::size_t s = 0; s < rows.size (); s++)
@@ -368,23 +357,22 @@ Engine::fuse_frame (const CodedFrames &frames, const RowSink &sink,
     sink (y, rows.data ());
   }
   if (!deviations)
-    return true;
+    return;
   if (!uncertainty_)
     uncertainty_.emplace (schedule_, *plan_, quality_, size_, depth_);
-  const Field &misfit = motion_ ? misfit_ : seen->predicted.misfit;
-  return uncertainty_->run (
-      {frames, partner_fit_ ? &*partner_fit_ : nullptr, noise_, seen->still,
+  const Field &misfit = motion_ ? misfit_ : seen.predicted.misfit;
+  uncertainty_->run (
+      {frames, partner_fit_ ? &*partner_fit_ : nullptr, noise_, seen.still,
           misfit, light_, refiner_ ? &deviations_ : nullptr},
       deviations, task);
 }
 
-bool
+void
 Engine::fuse (
     const RowSink &sink, const Task &task, const Uncertainty::Sink &deviations)
 {
-  const bool done = fuse_frame (stream_->frames (), sink, task, deviations);
+  fuse_frame (stream_->frames (), sink, task, deviations);
   stream_->advance ();
-  return done;
 }
 
 void

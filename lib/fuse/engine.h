@@ -44,8 +44,8 @@ public:
   /** Fuses the oldest frame of stream (), and takes it from there.
    * @p deviations  gets the half-width of the 68 % interval of each pixel, if
    *                 it is set.
-   * False, or Stopped, when it was stopped; forget () is to be called then. */
-  bool fuse (const RowSink &sink, const Task &task,
+   * After Stopped, forget () is to be called. */
+  void fuse (const RowSink &sink, const Task &task,
       const Uncertainty::Sink &deviations = {});
   /** Takes the oldest frame away, after what those behind it need to know of
    * it. */
@@ -61,21 +61,21 @@ private:
     StaticPixels::Found still;
   };
   /** Of a frame whose partner does not tell of all pixels, what the first
-   * camera alone tells. Nothing when it was stopped. */
-  std::optional<Seen> look (const CodedFrames &frames, const Task &task);
-  bool fuse_frame (const CodedFrames &frames, const RowSink &sink,
+   * camera alone tells. */
+  Seen look (const CodedFrames &frames, const Task &task);
+  void fuse_frame (const CodedFrames &frames, const RowSink &sink,
       const Task &task, const Uncertainty::Sink &deviations);
-  bool fill_light (
+  void fill_light (
       const CodedFrames &frames, const Seen &seen, const Task &task);
   /** Light, refined if it is to be. @p deviations  whether they are wanted. */
-  bool fill (const CodedFrames &frames, const Seen &seen, bool deviations,
+  void fill (const CodedFrames &frames, const Seen &seen, bool deviations,
       const Task &task);
-  bool fill_clipped (const CodedFrames &frames, const Seen &seen,
+  void fill_clipped (const CodedFrames &frames, const Seen &seen,
       bool deviations, const Task &task);
   /** PartnerFit of light_; @p made, if set, gets what that makes in the
    * partner.
    */
-  bool fit_partner (
+  void fit_partner (
       const CodedFrames &frames, const Task &task, Field *made = nullptr);
   void blend_static (const StaticPixels::Found &still);
   /** Standard deviation of coded pixels in grey levels. */

@@ -170,8 +170,7 @@ struct Fuser<Pixel>::State {
       float partner_scale, fuse::CodedFrame &frame) const;
   Result<void> check (std::span<const ImageView<Pixel>> frames,
       std::span<const ImageView<std::uint16_t>> uncertainty, Extent size) const;
-  /** False when it was stopped. */
-  bool fuse (std::span<const ImageView<Pixel>> frames, std::stop_token stop,
+  void fuse (std::span<const ImageView<Pixel>> frames, std::stop_token stop,
       std::span<const ImageView<std::uint16_t>> uncertainty);
   void forget ();
   /** What @p function returns; when that is an error, the pieces may have
@@ -343,13 +342,12 @@ Fuser<Pixel>::State::check (std::span<const ImageView<Pixel>> frames,
 }
 
 template <typename Pixel>
-bool
+void
 Fuser<Pixel>::State::fuse (std::span<const ImageView<Pixel>> frames,
     std::stop_token stop, std::span<const ImageView<std::uint16_t>> uncertainty)
 {
   const float scale = largest / (kWhite * float (range));
   const fuse::Task task{*workers, std::move (stop)};
-  bool done = true;
   for (Piece &piece : pieces) {
     const auto &[left, top, width, height] = piece.rect;
     const std::size_t held = std::size_t (piece.held);
@@ -388,13 +386,11 @@ Fuser<Pixel>::State::fuse (std::span<const ImageView<Pixel>> frames,
                 width, uncertainty[k].row (top + row.y) + left);
         };
     if (piece.overlap)
-      done &= piece.overlap->run (
+      piece.overlap->run (
           piece.engine->stream ().frames (), !uncertainty.empty (), task);
-    done = done && piece.engine->fuse (write, task,
-                       uncertainty.empty () ? fuse::Uncertainty::Sink ()
-                                            : write_deviation);
+    piece.engine->fuse (write, task,
+        uncertainty.empty () ? fuse::Uncertainty::Sink () : write_deviation);
   }
-  return done;
 }
 
 template <typename Pixel>
@@ -562,9 +558,8 @@ Fuser<Pixel>::fuse (std::span<const ImageView<Pixel>> frames,
 {
   RETURN_IF_ERROR (state_->check (frames, uncertainty, size ()));
   return state_->or_forget ([&] () -> Result<void> {
-    if (state_->fuse (frames, std::move (stop), uncertainty))
-      return {};
-    return stopped ();
+    state_->fuse (frames, std::move (stop), uncertainty);
+    return {};
   });
 }
 

@@ -133,7 +133,7 @@ LinearFilter::estimate (
         to.parts, to.light.row (s), to.still.row (0), to.rows.row (s));
 }
 
-bool
+void
 LinearFilter::run (const CodedFrames &frames,
     const Predictions::Found &predicted, const StaticPixels::Found &still,
     const RowSink &sink, const Task &task)
@@ -144,27 +144,26 @@ LinearFilter::run (const CodedFrames &frames,
   const int slots = plan_.observation.slots ();
   const int height = still.weight.height ();
   std::vector<std::optional<Room>> rooms (std::size_t (task.workers.count ()));
-  return task.run (
-      (height + kBandRows - 1) / kBandRows, [&] (int part, int worker) {
-        auto &room = rooms[std::size_t (worker)];
-        if (!room)
-          room.emplace (plan_.sources.width (), plan_.sources.period (),
-              int (filters.size ()), slots);
-        if (fit_ && !room->of_fit)
-          room->of_fit.emplace (*fit_);
-        std::vector<float *> rows;
-        for (int s = 0; s < slots; s++)
-          rows.push_back (room->rows.row (s));
-        const int end = std::min ((part + 1) * kBandRows, height);
-        for (int y = part * kBandRows; y < end; y++) {
-          share (predicted, still, y, *room);
-          estimate (filters, frames, y, *room);
-          if (frames.has_partner ())
-            fit_->run (y, frames.now->partner.light.row (y), rows.data (),
-                *room->of_fit);
-          sink (y, rows.data ());
-        }
-      });
+  task.run ((height + kBandRows - 1) / kBandRows, [&] (int part, int worker) {
+    auto &room = rooms[std::size_t (worker)];
+    if (!room)
+      room.emplace (plan_.sources.width (), plan_.sources.period (),
+          int (filters.size ()), slots);
+    if (fit_ && !room->of_fit)
+      room->of_fit.emplace (*fit_);
+    std::vector<float *> rows;
+    for (int s = 0; s < slots; s++)
+      rows.push_back (room->rows.row (s));
+    const int end = std::min ((part + 1) * kBandRows, height);
+    for (int y = part * kBandRows; y < end; y++) {
+      share (predicted, still, y, *room);
+      estimate (filters, frames, y, *room);
+      if (frames.has_partner ())
+        fit_->run (
+            y, frames.now->partner.light.row (y), rows.data (), *room->of_fit);
+      sink (y, rows.data ());
+    }
+  });
 }
 
 } // namespace codedexposure::fuse

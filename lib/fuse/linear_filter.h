@@ -28,8 +28,7 @@ public:
   LinearFilter (
       const FilterPlan &plan, const Models &models, const PartnerFit *fit);
 
-  /** False when it was stopped. */
-  bool run (const CodedFrames &frames, const Predictions::Found &predicted,
+  void run (const CodedFrames &frames, const Predictions::Found &predicted,
       const StaticPixels::Found &still, const RowSink &sink, const Task &task);
 
 private:

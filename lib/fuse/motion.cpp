@@ -389,7 +389,7 @@ MotionFilter::mix (const CodedFrames &frames, std::span<const Set *const> sets,
           slots[std::size_t (s)].row (row));
 }
 
-bool
+void
 MotionFilter::run (const CodedFrames &frames, std::span<Field> slots,
     Field &misfit, const Task &task)
 {
@@ -399,23 +399,22 @@ MotionFilter::run (const CodedFrames &frames, std::span<Field> slots,
     std::ranges::copy (set->factors, std::back_inserter (factors));
   std::vector<std::optional<Room>> rooms (std::size_t (task.workers.count ()));
   const int rows = misfit.height ();
-  return task.run (
-      (rows + kBandRows - 1) / kBandRows, [&] (int part, int worker) {
-        auto &room = rooms[std::size_t (worker)];
-        if (!room)
-          room.emplace (slots[0].width (), plan_.sources.period (),
-              int (slots.size ()), factors);
-        room->first = part * kBandRows;
-        room->rows = std::min (kBandRows, rows - room->first);
-        std::size_t first = 0;
-        for (const Set *set : sets) {
-          measure (frames, *set, first, *room);
-          first += set->factors.size ();
-        }
-        set_weights (*room, misfit);
-        for (int y = 0; y < room->rows; y++)
-          mix (frames, sets, y, slots, *room);
-      });
+  task.run ((rows + kBandRows - 1) / kBandRows, [&] (int part, int worker) {
+    auto &room = rooms[std::size_t (worker)];
+    if (!room)
+      room.emplace (slots[0].width (), plan_.sources.period (),
+          int (slots.size ()), factors);
+    room->first = part * kBandRows;
+    room->rows = std::min (kBandRows, rows - room->first);
+    std::size_t first = 0;
+    for (const Set *set : sets) {
+      measure (frames, *set, first, *room);
+      first += set->factors.size ();
+    }
+    set_weights (*room, misfit);
+    for (int y = 0; y < room->rows; y++)
+      mix (frames, sets, y, slots, *room);
+  });
 }
 
 } // namespace codedexposure::fuse

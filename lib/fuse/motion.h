@@ -35,9 +35,8 @@ public:
   /** Writes the light of every slot to @p slots, fields of the size of
    * @p frames. The result does not depend on the number of workers.
    * @p misfit  gets the mean squared error around each block of 2x2 pixels of
-   *            the class that fits best there, in grey levels squared.
-   * @return  false when it was stopped. */
-  bool run (const CodedFrames &frames, std::span<Field> slots, Field &misfit,
+   *            the class that fits best there, in grey levels squared. */
+  void run (const CodedFrames &frames, std::span<Field> slots, Field &misfit,
       const Task &task);
 
 private:

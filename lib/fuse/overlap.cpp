@@ -98,7 +98,7 @@ Overlap::Between::take (const CodedFrames &frames)
   engine->stream ().take ();
 }
 
-bool
+void
 Overlap::Between::fuse (Fused &to, bool deviations, const Task &task)
 {
   const auto slots = std::size_t (engine->slots ());
@@ -116,31 +116,29 @@ Overlap::Between::fuse (Fused &to, bool deviations, const Task &task)
   const Uncertainty::Sink of_deviations = [&] (const Uncertainty::Row &row) {
     keep (to.deviations, std::size_t (row.slot), row.y, row.deviations);
   };
-  to.known = engine->fuse (
-      sink, task, deviations ? of_deviations : Uncertainty::Sink ());
-  return to.known;
+  engine->fuse (sink, task, deviations ? of_deviations : Uncertainty::Sink ());
+  to.known = true;
 }
 
-bool
+void
 Overlap::Between::run (
     const CodedFrames &frames, bool deviations, const Task &task)
 {
   std::swap (before, after);
   after.known = false;
-  if (engine->stream ().pending () > 0 && !fuse (before, deviations, task))
-    return false;
+  if (engine->stream ().pending () > 0)
+    fuse (before, deviations, task);
   if (!frames.after)
-    return true;
+    return;
   take (frames);
-  return fuse (after, deviations, task);
+  fuse (after, deviations, task);
 }
 
-bool
+void
 Overlap::run (const CodedFrames &frames, bool deviations, const Task &task)
 {
-  return std::ranges::all_of (between_, [&] (Between &between) {
-    return between.run (frames, deviations, task);
-  });
+  for (Between &between : between_)
+    between.run (frames, deviations, task);
 }
 
 /* The exposure that begins in the last frame of a history is fused with the

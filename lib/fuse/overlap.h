@@ -34,9 +34,8 @@ public:
       int width, int height, const FuseOptions &options, double steps,
       std::stop_token stop);
 
-  /** Fuses the exposures around a coded frame, which is to be fused next.
-   * False, or Stopped, when it was stopped. */
-  bool run (const CodedFrames &frames, bool deviations, const Task &task);
+  /** Fuses the exposures around a coded frame, which is to be fused next. */
+  void run (const CodedFrames &frames, bool deviations, const Task &task);
   /** Instead of run (), for a coded frame that is not fused. */
   void pass (const CodedFrames &frames, Workers &workers);
   void forget ();
@@ -71,8 +70,8 @@ private:
     Between (
         const Schedule &schedule, int first_slot, std::unique_ptr<Engine> its);
     void take (const CodedFrames &frames);
-    bool fuse (Fused &to, bool deviations, const Task &task);
-    bool run (const CodedFrames &frames, bool deviations, const Task &task);
+    void fuse (Fused &to, bool deviations, const Task &task);
+    void run (const CodedFrames &frames, bool deviations, const Task &task);
   };
 
   explicit Overlap (int slots) : slots_ (slots) {}

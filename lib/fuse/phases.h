@@ -12,6 +12,7 @@
 
 #include "estimate/observation.h"
 #include "estimate/scene_model.h"
+#include "fuse/bands.h"
 #include "fuse/kernels.h"
 #include "schedule/schedule.h"
 
@@ -110,11 +111,6 @@ private:
 };
 
 class TapSources;
-
-/** Thrown where filters are made after their stop was requested; Fuser turns it
- * into ErrorCode::cancelled. */
-struct Stopped {
-};
 
 /** What the filters of a schedule are made from. */
 struct FilterPlan {

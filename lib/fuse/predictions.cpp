@@ -180,16 +180,16 @@ Predictions::predict_rows (
   }
 }
 
-const Predictions::Found *
+const Predictions::Found &
 Predictions::run (const CodedFrames &frames, const Task &task)
 {
   const Neighbours used = models_.used (frames.neighbours ());
   const FilterBank &filters =
       filters_.get (used, [&] { return make_filters (used); });
   rooms_.resize (std::size_t (task.workers.count ()), rooms_.front ());
-  const bool done = run_bands (task, found_.misfit.height (), kMinRows,
+  run_bands (task, found_.misfit.height (), kMinRows,
       [&] (const Band &band) { predict_rows (filters, frames, band); });
-  return done ? &found_ : nullptr;
+  return found_;
 }
 
 } // namespace codedexposure::fuse

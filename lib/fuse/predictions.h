@@ -39,8 +39,8 @@ public:
     /** Mean squared error of the best model, grey levels squared. */
     Field misfit;
   };
-  /** Null when it was stopped. Valid until it runs again. */
-  const Found *run (const CodedFrames &frames, const Task &task);
+  /** Valid until it runs again. */
+  const Found &run (const CodedFrames &frames, const Task &task);
 
 private:
   /** Of a thread. */

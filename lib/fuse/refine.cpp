@@ -229,7 +229,7 @@ Refiner::refine_part (const Frame &frame, int slot, int from, int to)
       });
 }
 
-bool
+void
 Refiner::run (const CodedFrames &frames, const Field &is_static,
     std::vector<Field> &light, std::vector<Field> *deviations, const Task &task)
 {
@@ -257,10 +257,8 @@ Refiner::run (const CodedFrames &frames, const Field &is_static,
     refine_part (
         frame, number / parts, rows * part / parts, rows * (part + 1) / parts);
   };
-  if (!task.run (slots_ * parts, refine))
-    return false;
+  task.run (slots_ * parts, refine);
   light.swap (refined_);
-  return true;
 }
 
 } // namespace codedexposure::fuse

@@ -46,9 +46,8 @@ public:
    * @p is_static   weight of static pixels, 0 to 1.
    * @p deviations  unless null, gets for each slot logarithms to base 2 of half
    *                the width of the interval of 68 % of the errors of refined
-   *                pixels, in grey levels, without rounding.
-   * False when it was stopped. */
-  bool run (const CodedFrames &frames, const Field &is_static,
+   *                pixels, in grey levels, without rounding. */
+  void run (const CodedFrames &frames, const Field &is_static,
       std::vector<Field> &light, std::vector<Field> *deviations,
       const Task &task);
 

@@ -118,7 +118,7 @@ StaticPixels::average_row (int y, const float *now)
   }
 }
 
-std::optional<StaticPixels::Found>
+StaticPixels::Found
 StaticPixels::take (
     const CodedFrames &frames, const Field &unrepeated, const Task &task)
 {
@@ -151,14 +151,13 @@ StaticPixels::take (
         weight[x] = std::max (weight[x], unchanged[x]);
     }
   };
-  if (!run_bands (task, height, kMinRows, compare_with_past) ||
-      !run_bands (task, height, kMinRows, add))
-    return {};
+  run_bands (task, height, kMinRows, compare_with_past);
+  run_bands (task, height, kMinRows, add);
   frames_++;
   compared_ = frames.after != nullptr;
   if (average_)
-    return Found{weight_, light_, &mean_, &count_};
-  return Found{weight_, now, nullptr, nullptr};
+    return {weight_, light_, &mean_, &count_};
+  return {weight_, now, nullptr, nullptr};
 }
 
 void

@@ -70,8 +70,8 @@ public:
   };
   /** Takes the next coded frame, and finds its static pixels.
    * @p unrepeated  see Predictions::Found.
-   * Nothing when it was stopped. Valid until the next one is taken. */
-  std::optional<Found> take (
+   * Valid until the next one is taken. */
+  Found take (
       const CodedFrames &frames, const Field &unrepeated, const Task &task);
   /**
    * With noise, static pixels of a smooth picture are truer if they are also

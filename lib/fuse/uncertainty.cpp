@@ -197,11 +197,10 @@ Uncertainty::run_slot (const Frame &frame, int slot, const Sink &sink) const
   }
 }
 
-bool
+void
 Uncertainty::run (const Frame &frame, const Sink &sink, const Task &task) const
 {
-  return task.run (
-      slots_, [&] (int slot, int) { run_slot (frame, slot, sink); });
+  task.run (slots_, [&] (int slot, int) { run_slot (frame, slot, sink); });
 }
 
 } // namespace codedexposure::fuse

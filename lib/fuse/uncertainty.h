@@ -75,8 +75,7 @@ public:
     const float *is_static;
   };
   using Sink = std::function<void (const Row &row)>;
-  /** False when it was stopped. */
-  bool run (const Frame &frame, const Sink &sink, const Task &task) const;
+  void run (const Frame &frame, const Sink &sink, const Task &task) const;
 
 private:
   void run_slot (const Frame &frame, int slot, const Sink &sink) const;

@@ -53,8 +53,6 @@ public:
    *  @p largest  light of a pixel, 255 for white. */
   StaticPixels (const Kernels &kernels, const NoiseMap &noise, Extent size,
       int radius, bool average, float largest);
-  int radius () const { return radius_; }
-
   /** Of a coded frame. */
   struct Found {
     const Field &weight; ///< of light: 0, moving, to 1, static

@@ -160,268 +160,233 @@ struct Fuser<Pixel>::State {
 
   Result<void> take (ImageView<const Pixel> coded,
       const std::optional<ImageView<const Pixel>> &partner,
-      const CodedErrors &errors);
+      const CodedErrors &errors)
+  {
+    const float scale = kWhite / largest;
+    const fuse::LightRatio ratio =
+        partner ? light_of (coded, *partner) : fuse::LightRatio ();
+    const float partner_scale = scale * float (ratio.value ());
+    /* Light that cannot be compared with that of the first camera tells
+     * nothing. */
+    const bool both = partner && ratio.known ();
+    const Extent size = pieces.front ().engine->size ();
+    const bool saturated =
+        both && beyond &&
+        fuse::has_clipped (coded.rows (0, size.height), Pixel (largest));
+    if (saturated)
+      RETURN_IF_ERROR (beyond->take (*partner));
+    for (Piece &piece : pieces) {
+      const auto &[x, y, width, height] = piece.rect;
+      fuse::CodedStream &stream = piece.engine->stream ();
+      fuse::CodedFrame &frame = stream.next ();
+      frame.has_partner = both;
+      set_light (frame.light, stream.camera (),
+          coded.block (x, y, width, height), scale);
+      if (both)
+        set_light (frame.partner.light, *stream.partner_camera (),
+            partner->block (x, y, width, height), partner_scale, partner_black);
+      if (errors.coded)
+        frame.errors = squared_errors (
+            stream.camera (), errors.coded->block (x, y, width, height), scale);
+      if (both && errors.partner)
+        frame.partner.errors = squared_errors (*stream.partner_camera (),
+            errors.partner->block (x, y, width, height), partner_scale);
+      frame.clipped = both ? clipped_near (piece, coded, *partner, frame)
+                           : std::vector<std::uint8_t> ();
+      if (saturated)
+        go_beyond (piece, coded, partner_scale, frame);
+      if (&piece == &pieces.front ())
+        for (const auto &[at, from] : covers) {
+          frame.light.row (at.y)[at.x] = frame.light.row (from.y)[from.x];
+          if (both)
+            frame.partner.light.row (at.y)[at.x] =
+                frame.partner.light.row (from.y)[from.x];
+        }
+      stream.take ();
+    }
+    return {};
+  }
+
+  /* By the background, or the whole. Where the first camera often is saturated,
+   * parts that the second one sees nearly as bright are left out: in some other
+   * slot, the first was saturated. */
   fuse::LightRatio light_of (
-      ImageView<const Pixel> coded, ImageView<const Pixel> partner) const;
+      ImageView<const Pixel> coded, ImageView<const Pixel> partner) const
+  {
+    constexpr float kBelow = 0.9f; // white
+    const Piece &piece = pieces.front ();
+    const auto [width, height] = piece.engine->size ();
+    const auto a = coded.block (piece.rect.x, piece.rect.y, width, height);
+    const auto b = partner.block (piece.rect.x, piece.rect.y, width, height);
+    const fuse::CodedStream &stream = piece.engine->stream ();
+    fuse::LightLimits limits{largest, largest, partner_black};
+    if (!beyond)
+      return fuse::light_ratio (stream, a, b, limits, {13, 32});
+    constexpr fuse::LightParts kSmall{5, 8};
+    const auto ratio = fuse::light_ratio (stream, a, b, limits, kSmall);
+    limits.first *= kBelow;
+    limits.second = std::min (
+        largest, limits.first / float (ratio.value ()) + partner_black);
+    return ratio.known () ? fuse::light_ratio (stream, a, b, limits, kSmall)
+                          : ratio;
+  }
+
+  /* Near pixels of which the partner does not tell, because it is saturated, or
+   * what it tells is far beyond white of fused frames and saturates the first
+   * camera. Empty: there are none. */
   std::vector<std::uint8_t> clipped_near (const Piece &piece,
       ImageView<const Pixel> coded, ImageView<const Pixel> partner,
-      const fuse::CodedFrame &frame) const;
+      const fuse::CodedFrame &frame) const
+  {
+    const auto white = Pixel (largest);
+    const float beyond_all = 1.1f * kWhite * float (range);
+    const auto [width, height] = piece.engine->size ();
+    const auto first = coded.block (piece.rect.x, piece.rect.y, width, height);
+    const auto seen = partner.block (piece.rect.x, piece.rect.y, width, height);
+    if (!fuse::has_clipped (seen, white) && !fuse::has_clipped (first, white))
+      return {};
+    std::vector<std::uint8_t> marks;
+    for (int y = 0; y < height; y++)
+      for (int x = 0; x < width; x++)
+        marks.push_back (seen.at (x, y) >= white ||
+                         (first.at (x, y) >= white &&
+                             frame.partner.light.row (y)[x] > beyond_all));
+    if (&piece == &pieces.front ())
+      for (const auto &[at, from] : covers)
+        marks[std::size_t (at.y) * std::size_t (width) + std::size_t (at.x)] =
+            marks[std::size_t (from.y) * std::size_t (width) +
+                  std::size_t (from.x)];
+    if (std::ranges::find (marks, 1) == marks.end ())
+      return {};
+    return fuse::near_marks (std::move (marks), width, height);
+  }
+
+  /* Light of saturated pixels, which is white at least, where the partner tells
+   * of it. It is as wrong, about, as the slot differs from the others, of which
+   * the partner saw the mean. */
   void go_beyond (const Piece &piece, ImageView<const Pixel> coded,
-      float partner_scale, fuse::CodedFrame &frame) const;
+      float partner_scale, fuse::CodedFrame &frame) const
+  {
+    const auto [width, height] = piece.engine->size ();
+    if (frame.errors.empty ())
+      frame.errors = Field (width, height);
+    for (int y = 0; y < height; y++)
+      for (int x = 0; x < width; x++) {
+        const int left = piece.rect.x + x, top = piece.rect.y + y;
+        const auto at = std::size_t (y) * std::size_t (width) + std::size_t (x);
+        if (coded.at (left, top) < largest ||
+            (!frame.clipped.empty () && frame.clipped[at]))
+          continue;
+        float &light = frame.light.row (y)[x];
+        light = std::max (
+            light, (beyond->at (left, top) - partner_black) * partner_scale);
+        const float apart = light - frame.partner.light.row (y)[x];
+        frame.errors.row (y)[x] = apart * apart;
+      }
+  }
+
   Result<void> check (std::span<const ImageView<Pixel>> frames,
-      std::span<const ImageView<std::uint16_t>> uncertainty, Extent size) const;
+      std::span<const ImageView<std::uint16_t>> uncertainty, Extent size) const
+  {
+    if (pieces.front ().engine->stream ().pending () == 0)
+      return Error{"no coded frame is pending; take () one first"};
+    for (const std::size_t views : {frames.size (),
+             uncertainty.empty () ? frames.size () : uncertainty.size ()})
+      if (int (views) != slots)
+        return Error{std::to_string (views) + " views instead of " +
+                     std::to_string (slots) + ", one for each slot"};
+    /* Without memory of the heap: an error leaves the coded frame pending. */
+    std::array<ViewBytes, 2 * Schedule::kMaxSlots> room;
+    std::size_t count = 0;
+    for (const auto &frame : frames)
+      room[count++] = ViewBytes::of (frame);
+    for (const auto &frame : uncertainty)
+      room[count++] = ViewBytes::of (frame);
+    const auto outputs = std::span<const ViewBytes> (room).first (count);
+    for (const ViewBytes &output : outputs)
+      RETURN_IF_ERROR (
+          check_view (output, "fused frame", size.width, size.height));
+    return check_apart (outputs);
+  }
+
   void fuse (std::span<const ImageView<Pixel>> frames, std::stop_token stop,
-      std::span<const ImageView<std::uint16_t>> uncertainty);
-  void forget ();
+      std::span<const ImageView<std::uint16_t>> uncertainty)
+  {
+    const float scale = largest / (kWhite * float (range));
+    const fuse::Task task{*workers, std::move (stop)};
+    for (Piece &piece : pieces) {
+      const auto &[left, top, width, height] = piece.rect;
+      const std::size_t held = std::size_t (piece.held);
+      const auto of_slot = [&] (std::size_t slot, int y,
+                               const float *const *rows) {
+        return piece.overlap ? piece.overlap->mix (int (slot), y, rows[slot],
+                                   piece.engine->is_static ().row (y))
+                             : rows[slot];
+      };
+      const auto write = [&] (int y, const float *const *rows) {
+        const auto row = [&] (std::size_t k) {
+          return frames[k].row (top + y) + left;
+        };
+        const fuse::Kernels &kernels = piece.engine->kernels ();
+        for (std::size_t k = 0; k < frames.size (); k++)
+          if (k % held != 0)
+            std::copy_n (row (k - 1), width, row (k));
+          else if constexpr (sizeof (Pixel) == 1)
+            kernels.to_bytes (
+                of_slot (k / held, y, rows), scale, largest, width, row (k));
+          else
+            kernels.to_words (
+                of_slot (k / held, y, rows), scale, largest, width, row (k));
+      };
+      const fuse::Uncertainty::Sink write_deviation =
+          [&] (const fuse::Uncertainty::Row &row) {
+            const float *deviations =
+                piece.overlap ? piece.overlap->mix_deviations (row.slot, row.y,
+                                    row.deviations,
+                                    piece.engine->is_static ().row (row.y))
+                              : row.deviations;
+            for (std::size_t k = std::size_t (row.slot) * held;
+                 k < std::size_t (row.slot + 1) * held; k++)
+              piece.engine->kernels ().to_words (deviations,
+                  float (kUncertaintyWhite) / (kWhite * float (range)),
+                  65535.0f, width, uncertainty[k].row (top + row.y) + left);
+          };
+      if (piece.overlap)
+        piece.overlap->run (
+            piece.engine->stream ().frames (), !uncertainty.empty (), task);
+      piece.engine->fuse (write, task,
+          uncertainty.empty () ? fuse::Uncertainty::Sink () : write_deviation);
+    }
+  }
+
+  void forget ()
+  {
+    for (Piece &piece : pieces) {
+      piece.engine->forget ();
+      if (piece.overlap)
+        piece.overlap->forget ();
+    }
+  }
+
   /** What @p function returns; when that is an error, the pieces may have
    * gone different ways, and all forget. */
   template <typename Function>
-  Result<void> or_forget (const Function &function);
-};
-
-/* Near pixels of which the partner does not tell, because it is saturated, or
- * what it tells is far beyond white of fused frames and saturates the first
- * camera. Empty: there are none. */
-template <typename Pixel>
-std::vector<std::uint8_t>
-Fuser<Pixel>::State::clipped_near (const Piece &piece,
-    ImageView<const Pixel> coded, ImageView<const Pixel> partner,
-    const fuse::CodedFrame &frame) const
-{
-  const auto white = Pixel (largest);
-  const float beyond_all = 1.1f * kWhite * float (range);
-  const auto [width, height] = piece.engine->size ();
-  const auto first = coded.block (piece.rect.x, piece.rect.y, width, height);
-  const auto seen = partner.block (piece.rect.x, piece.rect.y, width, height);
-  if (!fuse::has_clipped (seen, white) && !fuse::has_clipped (first, white))
-    return {};
-  std::vector<std::uint8_t> marks;
-  for (int y = 0; y < height; y++)
-    for (int x = 0; x < width; x++)
-      marks.push_back (seen.at (x, y) >= white ||
-                       (first.at (x, y) >= white &&
-                           frame.partner.light.row (y)[x] > beyond_all));
-  if (&piece == &pieces.front ())
-    for (const auto &[at, from] : covers)
-      marks[std::size_t (at.y) * std::size_t (width) + std::size_t (at.x)] =
-          marks[std::size_t (from.y) * std::size_t (width) +
-                std::size_t (from.x)];
-  if (std::ranges::find (marks, 1) == marks.end ())
-    return {};
-  return fuse::near_marks (std::move (marks), width, height);
-}
-
-/* By the background, or the whole. Where the first camera often is saturated,
- * parts that the second one sees nearly as bright are left out: in some other
- * slot, the first was saturated. */
-template <typename Pixel>
-fuse::LightRatio
-Fuser<Pixel>::State::light_of (
-    ImageView<const Pixel> coded, ImageView<const Pixel> partner) const
-{
-  constexpr float kBelow = 0.9f; // white
-  const Piece &piece = pieces.front ();
-  const auto [width, height] = piece.engine->size ();
-  const auto a = coded.block (piece.rect.x, piece.rect.y, width, height);
-  const auto b = partner.block (piece.rect.x, piece.rect.y, width, height);
-  const fuse::CodedStream &stream = piece.engine->stream ();
-  fuse::LightLimits limits{largest, largest, partner_black};
-  if (!beyond)
-    return fuse::light_ratio (stream, a, b, limits, {13, 32});
-  constexpr fuse::LightParts kSmall{5, 8};
-  const auto ratio = fuse::light_ratio (stream, a, b, limits, kSmall);
-  limits.first *= kBelow;
-  limits.second =
-      std::min (largest, limits.first / float (ratio.value ()) + partner_black);
-  return ratio.known () ? fuse::light_ratio (stream, a, b, limits, kSmall)
-                        : ratio;
-}
-
-/* Light of saturated pixels, which is white at least, where the partner tells
- * of it. It is as wrong, about, as the slot differs from the others, of which
- * the partner saw the mean. */
-template <typename Pixel>
-void
-Fuser<Pixel>::State::go_beyond (const Piece &piece,
-    ImageView<const Pixel> coded, float partner_scale,
-    fuse::CodedFrame &frame) const
-{
-  const auto [width, height] = piece.engine->size ();
-  if (frame.errors.empty ())
-    frame.errors = Field (width, height);
-  for (int y = 0; y < height; y++)
-    for (int x = 0; x < width; x++) {
-      const int left = piece.rect.x + x, top = piece.rect.y + y;
-      const auto at = std::size_t (y) * std::size_t (width) + std::size_t (x);
-      if (coded.at (left, top) < largest ||
-          (!frame.clipped.empty () && frame.clipped[at]))
-        continue;
-      float &light = frame.light.row (y)[x];
-      light = std::max (
-          light, (beyond->at (left, top) - partner_black) * partner_scale);
-      const float apart = light - frame.partner.light.row (y)[x];
-      frame.errors.row (y)[x] = apart * apart;
-    }
-}
-
-template <typename Pixel>
-Result<void>
-Fuser<Pixel>::State::take (ImageView<const Pixel> coded,
-    const std::optional<ImageView<const Pixel>> &partner,
-    const CodedErrors &errors)
-{
-  const float scale = kWhite / largest;
-  const fuse::LightRatio ratio =
-      partner ? light_of (coded, *partner) : fuse::LightRatio ();
-  const float partner_scale = scale * float (ratio.value ());
-  /* Light that cannot be compared with that of the first camera tells nothing.
-   */
-  const bool both = partner && ratio.known ();
-  const Extent size = pieces.front ().engine->size ();
-  const bool saturated =
-      both && beyond &&
-      fuse::has_clipped (coded.rows (0, size.height), Pixel (largest));
-  if (saturated)
-    RETURN_IF_ERROR (beyond->take (*partner));
-  for (Piece &piece : pieces) {
-    const auto &[x, y, width, height] = piece.rect;
-    fuse::CodedStream &stream = piece.engine->stream ();
-    fuse::CodedFrame &frame = stream.next ();
-    frame.has_partner = both;
-    set_light (frame.light, stream.camera (), coded.block (x, y, width, height),
-        scale);
-    if (both)
-      set_light (frame.partner.light, *stream.partner_camera (),
-          partner->block (x, y, width, height), partner_scale, partner_black);
-    if (errors.coded)
-      frame.errors = squared_errors (
-          stream.camera (), errors.coded->block (x, y, width, height), scale);
-    if (both && errors.partner)
-      frame.partner.errors = squared_errors (*stream.partner_camera (),
-          errors.partner->block (x, y, width, height), partner_scale);
-    frame.clipped = both ? clipped_near (piece, coded, *partner, frame)
-                         : std::vector<std::uint8_t> ();
-    if (saturated)
-      go_beyond (piece, coded, partner_scale, frame);
-    if (&piece == &pieces.front ())
-      for (const auto &[at, from] : covers) {
-        frame.light.row (at.y)[at.x] = frame.light.row (from.y)[from.x];
-        if (both)
-          frame.partner.light.row (at.y)[at.x] =
-              frame.partner.light.row (from.y)[from.x];
-      }
-    stream.take ();
-  }
-  return {};
-}
-
-template <typename Pixel>
-Result<void>
-Fuser<Pixel>::State::check (std::span<const ImageView<Pixel>> frames,
-    std::span<const ImageView<std::uint16_t>> uncertainty, Extent size) const
-{
-  if (pieces.front ().engine->stream ().pending () == 0)
-    return Error{"no coded frame is pending; take () one first"};
-  for (const std::size_t views : {frames.size (),
-           uncertainty.empty () ? frames.size () : uncertainty.size ()})
-    if (int (views) != slots)
-      return Error{std::to_string (views) + " views instead of " +
-                   std::to_string (slots) + ", one for each slot"};
-  /* Without memory of the heap: an error leaves the coded frame pending. */
-  std::array<ViewBytes, 2 * Schedule::kMaxSlots> room;
-  std::size_t count = 0;
-  for (const auto &frame : frames)
-    room[count++] = ViewBytes::of (frame);
-  for (const auto &frame : uncertainty)
-    room[count++] = ViewBytes::of (frame);
-  const auto outputs = std::span<const ViewBytes> (room).first (count);
-  for (const ViewBytes &output : outputs)
-    RETURN_IF_ERROR (
-        check_view (output, "fused frame", size.width, size.height));
-  return check_apart (outputs);
-}
-
-template <typename Pixel>
-void
-Fuser<Pixel>::State::fuse (std::span<const ImageView<Pixel>> frames,
-    std::stop_token stop, std::span<const ImageView<std::uint16_t>> uncertainty)
-{
-  const float scale = largest / (kWhite * float (range));
-  const fuse::Task task{*workers, std::move (stop)};
-  for (Piece &piece : pieces) {
-    const auto &[left, top, width, height] = piece.rect;
-    const std::size_t held = std::size_t (piece.held);
-    const auto of_slot = [&] (std::size_t slot, int y,
-                             const float *const *rows) {
-      return piece.overlap ? piece.overlap->mix (int (slot), y, rows[slot],
-                                 piece.engine->is_static ().row (y))
-                           : rows[slot];
-    };
-    const auto write = [&] (int y, const float *const *rows) {
-      const auto row = [&] (std::size_t k) {
-        return frames[k].row (top + y) + left;
-      };
-      const fuse::Kernels &kernels = piece.engine->kernels ();
-      for (std::size_t k = 0; k < frames.size (); k++)
-        if (k % held != 0)
-          std::copy_n (row (k - 1), width, row (k));
-        else if constexpr (sizeof (Pixel) == 1)
-          kernels.to_bytes (
-              of_slot (k / held, y, rows), scale, largest, width, row (k));
-        else
-          kernels.to_words (
-              of_slot (k / held, y, rows), scale, largest, width, row (k));
-    };
-    const fuse::Uncertainty::Sink write_deviation =
-        [&] (const fuse::Uncertainty::Row &row) {
-          const float *deviations =
-              piece.overlap
-                  ? piece.overlap->mix_deviations (row.slot, row.y,
-                        row.deviations, piece.engine->is_static ().row (row.y))
-                  : row.deviations;
-          for (std::size_t k = std::size_t (row.slot) * held;
-               k < std::size_t (row.slot + 1) * held; k++)
-            piece.engine->kernels ().to_words (deviations,
-                float (kUncertaintyWhite) / (kWhite * float (range)), 65535.0f,
-                width, uncertainty[k].row (top + row.y) + left);
-        };
-    if (piece.overlap)
-      piece.overlap->run (
-          piece.engine->stream ().frames (), !uncertainty.empty (), task);
-    piece.engine->fuse (write, task,
-        uncertainty.empty () ? fuse::Uncertainty::Sink () : write_deviation);
-  }
-}
-
-template <typename Pixel>
-void
-Fuser<Pixel>::State::forget ()
-{
-  for (Piece &piece : pieces) {
-    piece.engine->forget ();
-    if (piece.overlap)
-      piece.overlap->forget ();
-  }
-}
-
-template <typename Pixel>
-template <typename Function>
-Result<void>
-Fuser<Pixel>::State::or_forget (const Function &function)
-{
-  try {
-    Result<void> done = function ();
-    if (!done)
+  Result<void> or_forget (const Function &function)
+  {
+    try {
+      Result<void> done = function ();
+      if (!done)
+        forget ();
+      return done;
+    } catch (const fuse::Stopped &) {
       forget ();
-    return done;
-  } catch (const fuse::Stopped &) {
-    forget ();
-    return stopped ();
-  } catch (const std::bad_alloc &) {
-    forget ();
-    return out_of_memory ();
+      return stopped ();
+    } catch (const std::bad_alloc &) {
+      forget ();
+      return out_of_memory ();
+    }
   }
-}
+};
 
 template <typename Pixel>
 Result<Fuser<Pixel>>

@@ -54,31 +54,27 @@ struct PartnerCorrection<Pixel>::State {
   Image<std::uint16_t> elements;   ///< of each mirror but the pilot's
   Image<std::uint16_t> light = {}; ///< that the partner must have got
 
-  void add_up (int y);
+  void add_up (int y)
+  {
+    std::vector<float> all (std::size_t (light.width ()));
+    std::vector<const Pixel *> rows;
+    for (const Image<Pixel> &slot : fuser.slots ()) {
+      rows.push_back (slot.view ().row (y));
+      for (std::size_t x = 0; x < all.size (); x++)
+        all[x] += float (rows.back ()[x]);
+    }
+    const std::uint16_t *numbers = elements.view ().row (y);
+    std::uint16_t *to = light.view ().row (y);
+    for (std::size_t x = 0; x < all.size (); x++) {
+      const SlotSum &sum = sums[numbers[x]];
+      float more = 0.0f;
+      for (const int slot : sum.slots)
+        more += float (rows[std::size_t (slot)][x]);
+      to[x] = std::uint16_t (std::clamp (
+          sum.all * all[x] + sum.more * more + 0.5f, 0.0f, 65535.0f));
+    }
+  }
 };
-
-template <typename Pixel>
-void
-PartnerCorrection<Pixel>::State::add_up (int y)
-{
-  std::vector<float> all (std::size_t (light.width ()));
-  std::vector<const Pixel *> rows;
-  for (const Image<Pixel> &slot : fuser.slots ()) {
-    rows.push_back (slot.view ().row (y));
-    for (std::size_t x = 0; x < all.size (); x++)
-      all[x] += float (rows.back ()[x]);
-  }
-  const std::uint16_t *numbers = elements.view ().row (y);
-  std::uint16_t *to = light.view ().row (y);
-  for (std::size_t x = 0; x < all.size (); x++) {
-    const SlotSum &sum = sums[numbers[x]];
-    float more = 0.0f;
-    for (const int slot : sum.slots)
-      more += float (rows[std::size_t (slot)][x]);
-    to[x] = std::uint16_t (
-        std::clamp (sum.all * all[x] + sum.more * more + 0.5f, 0.0f, 65535.0f));
-  }
-}
 
 template <typename Pixel>
 Result<PartnerCorrection<Pixel>>

@@ -134,9 +134,80 @@ public:
       }
   }
   std::span<const Tap> taps () const { return taps_; } ///< of the pixels set
-  PhaseWeights weights ();
-  std::vector<float> sparse_slots (double excess) const;
-  std::vector<float> sparse_residual (double excess) const;
+
+  /* As one target more, row `middle` of the inverse of the bordered matrix: it
+   * holds the prediction of that pixel by all others, scaled. */
+  PhaseWeights weights ()
+  {
+    const std::size_t m = taps_.size (), n = std::size_t (slots ());
+    const auto partner = std::size_t (
+        std::ranges::find (taps_, Tap{0, 0, kPartner}) - taps_.begin ());
+    const auto leave_out = [&] (std::size_t tap) {
+      system_.flat_targets.push_back (0.0);
+      system_.targets.resize (system_.targets.size () + m);
+      system_.targets[system_.targets.size () - m + tap] = 1.0;
+    };
+    leave_out (middle_);
+    if (partner < m)
+      leave_out (partner);
+    const std::vector<double> solved = solve_kriging (system_);
+    const double *row = solved.data () + n * m;
+    PhaseWeights weights;
+    weights.slots.assign (solved.data (), row);
+    keep_known (weights.slots);
+    const auto prediction = [m] (const double *of_row, std::size_t tap) {
+      std::vector<float> residual;
+      for (std::size_t i = 0; i < m; i++)
+        residual.push_back (float (-of_row[i] / of_row[tap]));
+      return residual;
+    };
+    weights.residual = prediction (row, middle_);
+    weights.predicted_variance = 1.0 / row[middle_];
+    if (partner < m) {
+      weights.partner_residual = prediction (row + m, partner);
+      weights.partner_variance = 1.0 / row[m + partner];
+    }
+    for (std::size_t slot = 0; slot < n; slot++)
+      weights.slot_variances.push_back (slot_variance (slot, solved));
+    return weights;
+  }
+
+  std::vector<float> sparse_slots (double excess) const
+  {
+    constexpr double kScene = 1.0;
+    const SparseKriging kriging (system_, pairs_of (taps_));
+    std::vector<float> weights;
+    for (std::size_t at = 0; at < system_.targets.size (); at += taps_.size ())
+      std::ranges::copy (
+          kriging.solve (
+              std::span (system_.targets).subspan (at, taps_.size ()), 1.0,
+              kScene, excess),
+          std::back_inserter (weights));
+    keep_known (weights);
+    return weights;
+  }
+
+  /* The middle tap is sought, so it is not among the equations' taps. */
+  std::vector<float> sparse_residual (double excess) const
+  {
+    std::vector<int> others;
+    std::vector<Tap> taps;
+    std::vector<double> target;
+    for (std::size_t i = 0; i < taps_.size (); i++)
+      if (i != middle_) {
+        others.push_back (int (i));
+        taps.push_back (taps_[i]);
+        target.push_back (covariance (i, middle_));
+      }
+    const double variance =
+        covariance (middle_, middle_) + system_.noise[middle_];
+    const auto solved =
+        SparseKriging (equations_of (system_, others), pairs_of (taps))
+            .solve (target, 1.0, variance, excess);
+    std::vector<float> weights (solved.begin (), solved.end ());
+    weights.insert (weights.begin () + std::ptrdiff_t (middle_), -1.0f);
+    return weights;
+  }
 
 private:
   int slots () const { return plan_.observation.slots (); }
@@ -173,11 +244,86 @@ private:
     return system_
         .covariance[std::min (a, b) * taps_.size () + std::max (a, b)];
   }
-  void choose_taps (int row, int x);
-  void set_system (int row, int x);
-  double slot_variance (
-      std::size_t slot, std::span<const double> weights) const;
-  void keep_known (std::vector<float> &weights) const;
+
+  /* Which ones tell most depends on the elements around the pixel. */
+  void choose_taps (int row, int x)
+  {
+    const std::vector<int> elements = plan_.phases.elements (row, x, all_);
+    std::vector<bool> used (all_.size (), true);
+    for (const int frame : {-1, 1}) {
+      const int slot = (frame < 0 ? 0 : slots () - 1) - frames_.min * slots ();
+      std::vector<std::pair<double, std::size_t>> told;
+      for (std::size_t i = 0; i < all_.size (); i++)
+        if (all_[i].frame == frame)
+          told.emplace_back (
+              -covariance_.target ({all_[i].x, all_[i].y},
+                  (frame - frames_.min) * slots () + elements[i], slot),
+              i);
+      std::ranges::sort (told);
+      for (std::size_t i = per_neighbour_; i < told.size (); i++)
+        used[told[i].second] = false;
+    }
+    taps_.clear ();
+    for (std::size_t i = 0; i < all_.size (); i++)
+      if (used[i])
+        taps_.push_back (all_[i]);
+  }
+
+  void set_system (int row, int x)
+  {
+    if (per_neighbour_ != kAllTaps)
+      choose_taps (row, x);
+    const std::vector<int> elements = plan_.phases.elements (row, x, taps_);
+    std::vector<Offset> places;
+    std::vector<int> exposed;
+    std::vector<double> noise;
+    for (int frame = 0; frame < count (); frame++)
+      noise.insert (noise.end (), plan_.noise.begin (), plan_.noise.end ());
+    noise.insert (
+        noise.end (), plan_.partner_noise.begin (), plan_.partner_noise.end ());
+    for (std::size_t i = 0; i < taps_.size (); i++) {
+      places.push_back ({taps_[i].x, taps_[i].y});
+      const int frame =
+          is_partner (i) ? count () : taps_[i].frame - frames_.min;
+      exposed.push_back (frame * slots () + elements[i]);
+    }
+    element_ = elements[middle_];
+    system_ = slot_equations (covariance_, places, exposed, noise);
+    const std::ptrdiff_t of_frame = slots () * std::ptrdiff_t (taps_.size ());
+    const auto first = system_.targets.begin () - frames_.min * of_frame;
+    system_.targets = {first, first + of_frame};
+    for (std::size_t i = 0; i < taps_.size (); i++)
+      for (std::size_t j = i; is_partner (i) && j < taps_.size (); j++)
+        if (is_partner (j))
+          system_.covariance[i * taps_.size () + j] += kPartnerFlatVariance;
+    system_.flat.assign (taps_.size (), 1.0);
+    system_.flat_targets.assign (std::size_t (slots ()), 1.0);
+  }
+
+  /* The expected squared error of ordinary kriging in flat light, 1 - w c +
+   * lambda. The multiplier lambda is the same in all equations of a target; it
+   * is taken from that of the middle tap. */
+  double slot_variance (std::size_t slot, std::span<const double> weights) const
+  {
+    const double *w = weights.data () + slot * taps_.size ();
+    const double *c = system_.targets.data () + slot * taps_.size ();
+    double variance = 1.0 - c[middle_] + system_.noise[middle_] * w[middle_];
+    for (std::size_t i = 0; i < taps_.size (); i++)
+      variance += w[i] * (covariance (i, middle_) - c[i]);
+    return variance;
+  }
+
+  /* Without noise, a pixel of a one-hot code is known in its own slot. */
+  void keep_known (std::vector<float> &weights) const
+  {
+    const Observation &observation = plan_.observation;
+    if (!observation.exact () || !observation.noise_free ())
+      return;
+    const auto slot = weights.begin () + observation.shares (element_)[0].slot *
+                                             std::ptrdiff_t (taps_.size ());
+    std::fill_n (slot, taps_.size (), 0.0f);
+    slot[std::ptrdiff_t (middle_)] = 1.0f;
+  }
 
   const FilterPlan &plan_;
   std::span<const Tap> all_;
@@ -189,166 +335,6 @@ private:
   int element_ = 0;
   KrigingSystem system_; ///< ordinary kriging of the slots of the middle frame
 };
-
-/* Which ones tell most depends on the elements around the pixel. */
-void
-Equations::choose_taps (int row, int x)
-{
-  const std::vector<int> elements = plan_.phases.elements (row, x, all_);
-  std::vector<bool> used (all_.size (), true);
-  for (const int frame : {-1, 1}) {
-    const int slot = (frame < 0 ? 0 : slots () - 1) - frames_.min * slots ();
-    std::vector<std::pair<double, std::size_t>> told;
-    for (std::size_t i = 0; i < all_.size (); i++)
-      if (all_[i].frame == frame)
-        told.emplace_back (
-            -covariance_.target ({all_[i].x, all_[i].y},
-                (frame - frames_.min) * slots () + elements[i], slot),
-            i);
-    std::ranges::sort (told);
-    for (std::size_t i = per_neighbour_; i < told.size (); i++)
-      used[told[i].second] = false;
-  }
-  taps_.clear ();
-  for (std::size_t i = 0; i < all_.size (); i++)
-    if (used[i])
-      taps_.push_back (all_[i]);
-}
-
-void
-Equations::set_system (int row, int x)
-{
-  if (per_neighbour_ != kAllTaps)
-    choose_taps (row, x);
-  const std::vector<int> elements = plan_.phases.elements (row, x, taps_);
-  std::vector<Offset> places;
-  std::vector<int> exposed;
-  std::vector<double> noise;
-  for (int frame = 0; frame < count (); frame++)
-    noise.insert (noise.end (), plan_.noise.begin (), plan_.noise.end ());
-  noise.insert (
-      noise.end (), plan_.partner_noise.begin (), plan_.partner_noise.end ());
-  for (std::size_t i = 0; i < taps_.size (); i++) {
-    places.push_back ({taps_[i].x, taps_[i].y});
-    const int frame = is_partner (i) ? count () : taps_[i].frame - frames_.min;
-    exposed.push_back (frame * slots () + elements[i]);
-  }
-  element_ = elements[middle_];
-  system_ = slot_equations (covariance_, places, exposed, noise);
-  const std::ptrdiff_t of_frame = slots () * std::ptrdiff_t (taps_.size ());
-  const auto first = system_.targets.begin () - frames_.min * of_frame;
-  system_.targets = {first, first + of_frame};
-  for (std::size_t i = 0; i < taps_.size (); i++)
-    for (std::size_t j = i; is_partner (i) && j < taps_.size (); j++)
-      if (is_partner (j))
-        system_.covariance[i * taps_.size () + j] += kPartnerFlatVariance;
-  system_.flat.assign (taps_.size (), 1.0);
-  system_.flat_targets.assign (std::size_t (slots ()), 1.0);
-}
-
-/* Without noise, a pixel of a one-hot code is known in its own slot. */
-void
-Equations::keep_known (std::vector<float> &weights) const
-{
-  const Observation &observation = plan_.observation;
-  if (!observation.exact () || !observation.noise_free ())
-    return;
-  const auto slot = weights.begin () + observation.shares (element_)[0].slot *
-                                           std::ptrdiff_t (taps_.size ());
-  std::fill_n (slot, taps_.size (), 0.0f);
-  slot[std::ptrdiff_t (middle_)] = 1.0f;
-}
-
-/* The expected squared error of ordinary kriging in flat light, 1 - w c +
- * lambda. The multiplier lambda is the same in all equations of a target; it is
- * taken from that of the middle tap. */
-double
-Equations::slot_variance (
-    std::size_t slot, std::span<const double> weights) const
-{
-  const double *w = weights.data () + slot * taps_.size ();
-  const double *c = system_.targets.data () + slot * taps_.size ();
-  double variance = 1.0 - c[middle_] + system_.noise[middle_] * w[middle_];
-  for (std::size_t i = 0; i < taps_.size (); i++)
-    variance += w[i] * (covariance (i, middle_) - c[i]);
-  return variance;
-}
-
-/* As one target more, row `middle` of the inverse of the bordered matrix: it
- * holds the prediction of that pixel by all others, scaled. */
-PhaseWeights
-Equations::weights ()
-{
-  const std::size_t m = taps_.size (), n = std::size_t (slots ());
-  const auto partner = std::size_t (
-      std::ranges::find (taps_, Tap{0, 0, kPartner}) - taps_.begin ());
-  const auto leave_out = [&] (std::size_t tap) {
-    system_.flat_targets.push_back (0.0);
-    system_.targets.resize (system_.targets.size () + m);
-    system_.targets[system_.targets.size () - m + tap] = 1.0;
-  };
-  leave_out (middle_);
-  if (partner < m)
-    leave_out (partner);
-  const std::vector<double> solved = solve_kriging (system_);
-  const double *row = solved.data () + n * m;
-  PhaseWeights weights;
-  weights.slots.assign (solved.data (), row);
-  keep_known (weights.slots);
-  const auto prediction = [m] (const double *of_row, std::size_t tap) {
-    std::vector<float> residual;
-    for (std::size_t i = 0; i < m; i++)
-      residual.push_back (float (-of_row[i] / of_row[tap]));
-    return residual;
-  };
-  weights.residual = prediction (row, middle_);
-  weights.predicted_variance = 1.0 / row[middle_];
-  if (partner < m) {
-    weights.partner_residual = prediction (row + m, partner);
-    weights.partner_variance = 1.0 / row[m + partner];
-  }
-  for (std::size_t slot = 0; slot < n; slot++)
-    weights.slot_variances.push_back (slot_variance (slot, solved));
-  return weights;
-}
-
-std::vector<float>
-Equations::sparse_slots (double excess) const
-{
-  constexpr double kScene = 1.0;
-  const SparseKriging kriging (system_, pairs_of (taps_));
-  std::vector<float> weights;
-  for (std::size_t at = 0; at < system_.targets.size (); at += taps_.size ())
-    std::ranges::copy (
-        kriging.solve (std::span (system_.targets).subspan (at, taps_.size ()),
-            1.0, kScene, excess),
-        std::back_inserter (weights));
-  keep_known (weights);
-  return weights;
-}
-
-/* The middle tap is sought, so it is not among the equations' taps. */
-std::vector<float>
-Equations::sparse_residual (double excess) const
-{
-  std::vector<int> others;
-  std::vector<Tap> taps;
-  std::vector<double> target;
-  for (std::size_t i = 0; i < taps_.size (); i++)
-    if (i != middle_) {
-      others.push_back (int (i));
-      taps.push_back (taps_[i]);
-      target.push_back (covariance (i, middle_));
-    }
-  const double variance =
-      covariance (middle_, middle_) + system_.noise[middle_];
-  const auto solved =
-      SparseKriging (equations_of (system_, others), pairs_of (taps))
-          .solve (target, 1.0, variance, excess);
-  std::vector<float> weights (solved.begin (), solved.end ());
-  weights.insert (weights.begin () + std::ptrdiff_t (middle_), -1.0f);
-  return weights;
-}
 
 } // namespace
 

@@ -56,6 +56,17 @@ constexpr double kBetween = 0.9;
  * centred on it gets. */
 constexpr double kMixed = 0.6;
 
+/* Parts 0 .. parts - 1; null: on the caller's thread. */
+template <typename Part>
+void
+run_parts (Workers *workers, int parts, const Part &part)
+{
+  if (workers)
+    workers->run (parts, [&] (int i, int) { part (i); });
+  for (int i = 0; !workers && i < parts; i++)
+    part (i);
+}
+
 } // namespace
 
 struct Rectifier::Plan {
@@ -84,13 +95,72 @@ struct Rectifier::Plan {
   using Measured = std::unique_ptr<float[], Keep>;
 
   template <typename Pixel>
-  rectify::RectifyRow<Pixel> *run_row () const;
+  rectify::RectifyRow<Pixel> *run_row () const
+  {
+    return std::get<rectify::RectifyRow<Pixel> *const(&)[3]> (
+        std::tie (kernels.bytes, kernels.words))[(taps - kWindows[0].taps) / 2];
+  }
+
+  /* How rough the scene is around the windows of all mirrors. */
   template <typename Pixel>
-  Measured measure (ImageView<const Pixel> from, Workers *workers) const;
-  rectify::Filters filters_for (int largest, const Measured &roughness) const;
+  Measured measure (ImageView<const Pixel> from, Workers *workers) const
+  {
+    const auto row_kernel = std::get<rectify::MeasureRow<Pixel> *const &> (
+        std::tie (kernels.measure_bytes, kernels.measure_words));
+    Measured roughness (spare.exchange (nullptr), {this});
+    if (!roughness)
+      roughness.reset (new float[std::size_t (windows.width) *
+                                 std::size_t (windows.height)]);
+    const int inside = (taps - 1 - rectify::kSteps) / 2;
+    const int left = windows.x + inside, top = windows.y + inside;
+    run_parts (workers, windows.height, [&] (int y) {
+      row_kernel ({from.row (top + y) + left, from.stride, from.width - left},
+          windows.width, roughness.get () + std::ptrdiff_t (y) * windows.width);
+    });
+    return roughness;
+  }
+
+  rectify::Filters filters_for (int largest, const Measured &roughness) const
+  {
+    rectify::Filters with{filters.weights.data (), filters.scales.data (),
+        filters.errors.data (), {},
+        noise * noise * float (largest) * float (largest), float (largest),
+        {roughness.get (), windows.width, windows.x, windows.y}};
+    for (std::size_t i = 0; i + 1 < FilterBank::kNoises.size (); i++)
+      with.limits[i] =
+          float (1.0 / (FilterBank::kNoises[i] * FilterBank::kNoises[i + 1]));
+    return with;
+  }
+
+  /* Mirrors that are copied have what their pixel has. */
   template <typename Pixel>
   void mark_unknown (
-      ImageView<const Pixel> from, ImageView<Pixel> to, Pixel largest) const;
+      ImageView<const Pixel> from, ImageView<Pixel> to, Pixel largest) const
+  {
+    if (report.unseen > 0)
+      for (int y = 0; y < mirrors.height; y++)
+        for (int x = 0; x < mirrors.width; x++)
+          if (places.at (x, y).filter == Place::kUnseen)
+            to.at (x, y) = largest;
+    const auto any_in = [&] (int y, int first, int count) {
+      const Pixel *row = from.row (y) + first;
+      return std::any_of (
+          row, row + count, [=] (Pixel pixel) { return pixel >= largest; });
+    };
+    std::vector<char> rows;
+    for (int y = 0; y < from.height; y++)
+      rows.push_back (any_in (y, 0, from.width));
+    if (std::find (rows.begin (), rows.end (), 1) == rows.end ())
+      return;
+    for (int y = 0; y < mirrors.height; y++)
+      for (int x = 0; x < mirrors.width; x++) {
+        const Place &place = places.at (x, y);
+        for (int i = 0; place.filter >= 0 && i < taps; i++)
+          if (rows[std::size_t (place.y + i)] &&
+              any_in (place.y + i, place.x, taps))
+            to.at (x, y) = largest;
+      }
+  }
 };
 
 namespace
@@ -114,7 +184,16 @@ public:
 
   /** To make all filters, as a part of what is allowed. */
   double effort () const { return whole_ ? 0.0 : bank_.effort (); }
-  void place_row (int y, Place *row, RectifyReport &report);
+
+  void place_row (int y, Place *row, RectifyReport &report)
+  {
+    mapping_.camera_row (y, seen_);
+    if (!whole_)
+      bank_.surroundings ().find_row (y, around_);
+    for (std::size_t x = 0; x < seen_.size (); x++)
+      row[x] = place (seen_[x], {int (x), y}, around_[x], report);
+  }
+
   FilterBank::Tables filters () && { return std::move (bank_).tables (); }
   const WeightSolver &solver () const { return bank_.solver (); }
   /** Mean share of mirrors that are not copied in their best pixel, as a part
@@ -135,7 +214,40 @@ private:
         .correlation = std::pow (
             kPersistence, double (most) / elements_.schedule ().slots ())};
   }
-  Place place (Position seen, Offset mirror, int around, RectifyReport &report);
+  Place place (Position seen, Offset mirror, int around, RectifyReport &report)
+  {
+    const Extent camera = mapping_.camera ();
+    /* NaN must count as outside, too. */
+    if (!(seen.x > -0.5 && seen.x < camera.width - 0.5 && seen.y > -0.5 &&
+            seen.y < camera.height - 0.5)) {
+      report.unseen++;
+      return {};
+    }
+    const int px = int (seen.x + 0.5), py = int (seen.y + 0.5);
+    const double fx = seen.x - px, fy = seen.y - py;
+    const double share = bank_.solver ().own_share (-fx, -fy);
+    const Place pixel = {std::int16_t (px), std::int16_t (py), Place::kLookup};
+    if (whole_ || (single_ && share > kOwn)) {
+      report.exact++;
+      return pixel;
+    }
+    report.weighted++;
+    shares_ += share;
+    report.mixed += share < kMixed * best_share_;
+    const int taps = bank_.solver ().taps ();
+    if (mirror.y >= coded_rows_ || taps > camera.width || taps > camera.height)
+      return pixel;
+    const int left = std::clamp (px - taps / 2, 0, camera.width - taps);
+    const int top = std::clamp (py - taps / 2, 0, camera.height - taps);
+    const int x = left + taps / 2, y = top + taps / 2;
+    if (x == px && y == py)
+      return {std::int16_t (left), std::int16_t (top),
+          bank_.filter (around, fx, fy)};
+    if (share > kOwn || !bank_.has_border ())
+      return pixel;
+    return {std::int16_t (left), std::int16_t (top),
+        bank_.border_filter (around, mirror, seen.x - x, seen.y - y)};
+  }
 
   const Mapping &mapping_;
   int coded_rows_;
@@ -148,52 +260,6 @@ private:
   std::vector<Position> seen_;
   std::vector<int> around_;
 };
-
-void
-Planner::place_row (int y, Place *row, RectifyReport &report)
-{
-  mapping_.camera_row (y, seen_);
-  if (!whole_)
-    bank_.surroundings ().find_row (y, around_);
-  for (std::size_t x = 0; x < seen_.size (); x++)
-    row[x] = place (seen_[x], {int (x), y}, around_[x], report);
-}
-
-Place
-Planner::place (Position seen, Offset mirror, int around, RectifyReport &report)
-{
-  const Extent camera = mapping_.camera ();
-  /* NaN must count as outside, too. */
-  if (!(seen.x > -0.5 && seen.x < camera.width - 0.5 && seen.y > -0.5 &&
-          seen.y < camera.height - 0.5)) {
-    report.unseen++;
-    return {};
-  }
-  const int px = int (seen.x + 0.5), py = int (seen.y + 0.5);
-  const double fx = seen.x - px, fy = seen.y - py;
-  const double share = bank_.solver ().own_share (-fx, -fy);
-  const Place pixel = {std::int16_t (px), std::int16_t (py), Place::kLookup};
-  if (whole_ || (single_ && share > kOwn)) {
-    report.exact++;
-    return pixel;
-  }
-  report.weighted++;
-  shares_ += share;
-  report.mixed += share < kMixed * best_share_;
-  const int taps = bank_.solver ().taps ();
-  if (mirror.y >= coded_rows_ || taps > camera.width || taps > camera.height)
-    return pixel;
-  const int left = std::clamp (px - taps / 2, 0, camera.width - taps);
-  const int top = std::clamp (py - taps / 2, 0, camera.height - taps);
-  const int x = left + taps / 2, y = top + taps / 2;
-  if (x == px && y == py)
-    return {
-        std::int16_t (left), std::int16_t (top), bank_.filter (around, fx, fy)};
-  if (share > kOwn || !bank_.has_border ())
-    return pixel;
-  return {std::int16_t (left), std::int16_t (top),
-      bank_.border_filter (around, mirror, seen.x - x, seen.y - y)};
-}
 
 /* 0 for a magnification out of range. */
 int
@@ -256,17 +322,6 @@ windows_of (ImageView<const Place> places)
         bottom = std::max (bottom, place.y + 1);
       }
   return {left, top, std::max (right - left, 0), std::max (bottom - top, 0)};
-}
-
-/* Parts 0 .. parts - 1; null: on the caller's thread. */
-template <typename Part>
-void
-run_parts (Workers *workers, int parts, const Part &part)
-{
-  if (workers)
-    workers->run (parts, [&] (int i, int) { part (i); });
-  for (int i = 0; !workers && i < parts; i++)
-    part (i);
 }
 
 /* @effort: to find the weights, as a part of what is allowed. */
@@ -360,78 +415,6 @@ const RectifyReport &
 Rectifier::report () const
 {
   return plan_->report;
-}
-
-/* Mirrors that are copied have what their pixel has. */
-template <typename Pixel>
-void
-Rectifier::Plan::mark_unknown (
-    ImageView<const Pixel> from, ImageView<Pixel> to, Pixel largest) const
-{
-  if (report.unseen > 0)
-    for (int y = 0; y < mirrors.height; y++)
-      for (int x = 0; x < mirrors.width; x++)
-        if (places.at (x, y).filter == Place::kUnseen)
-          to.at (x, y) = largest;
-  const auto any_in = [&] (int y, int first, int count) {
-    const Pixel *row = from.row (y) + first;
-    return std::any_of (
-        row, row + count, [=] (Pixel pixel) { return pixel >= largest; });
-  };
-  std::vector<char> rows;
-  for (int y = 0; y < from.height; y++)
-    rows.push_back (any_in (y, 0, from.width));
-  if (std::find (rows.begin (), rows.end (), 1) == rows.end ())
-    return;
-  for (int y = 0; y < mirrors.height; y++)
-    for (int x = 0; x < mirrors.width; x++) {
-      const Place &place = places.at (x, y);
-      for (int i = 0; place.filter >= 0 && i < taps; i++)
-        if (rows[std::size_t (place.y + i)] &&
-            any_in (place.y + i, place.x, taps))
-          to.at (x, y) = largest;
-    }
-}
-
-template <typename Pixel>
-rectify::RectifyRow<Pixel> *
-Rectifier::Plan::run_row () const
-{
-  return std::get<rectify::RectifyRow<Pixel> *const(&)[3]> (
-      std::tie (kernels.bytes, kernels.words))[(taps - kWindows[0].taps) / 2];
-}
-
-/* How rough the scene is around the windows of all mirrors. */
-template <typename Pixel>
-Rectifier::Plan::Measured
-Rectifier::Plan::measure (ImageView<const Pixel> from, Workers *workers) const
-{
-  const auto row_kernel = std::get<rectify::MeasureRow<Pixel> *const &> (
-      std::tie (kernels.measure_bytes, kernels.measure_words));
-  Measured roughness (spare.exchange (nullptr), {this});
-  if (!roughness)
-    roughness.reset (
-        new float[std::size_t (windows.width) * std::size_t (windows.height)]);
-  const int inside = (taps - 1 - rectify::kSteps) / 2;
-  const int left = windows.x + inside, top = windows.y + inside;
-  run_parts (workers, windows.height, [&] (int y) {
-    row_kernel ({from.row (top + y) + left, from.stride, from.width - left},
-        windows.width, roughness.get () + std::ptrdiff_t (y) * windows.width);
-  });
-  return roughness;
-}
-
-rectify::Filters
-Rectifier::Plan::filters_for (int largest, const Measured &roughness) const
-{
-  rectify::Filters with{filters.weights.data (), filters.scales.data (),
-      filters.errors.data (), {},
-      noise * noise * float (largest) * float (largest), float (largest),
-      {roughness.get (), windows.width, windows.x, windows.y}};
-  for (std::size_t i = 0; i + 1 < FilterBank::kNoises.size (); i++)
-    with.limits[i] =
-        float (1.0 / (FilterBank::kNoises[i] * FilterBank::kNoises[i + 1]));
-  return with;
 }
 
 template <typename Pixel>

@@ -16,19 +16,6 @@
 namespace codedexposure::CODEDEXPOSURE_TARGET
 {
 
-/** Calls body (at, put) for all cells, kCells at a time. */
-template <typename Number, typename Body>
-CODEDEXPOSURE_INLINE void
-for_cells (int cells, bool stream, Body body)
-{
-  constexpr int kC = kCells<Number>;
-  int at = 0;
-  for (; at + kC <= cells; at += kC)
-    body (at, Put{stream});
-  if (at < cells)
-    body (cells - kC, Put{false});
-}
-
 /** What is the same in all slots of some cells, or of any cells if there is no
  * common factor: sums of fractions where there are any, else of whole numbers.
  */
@@ -74,7 +61,7 @@ struct Starts {
       return add (linear, parts, Whole<Number> (0).numbers ());
     steps = (from.cells + kC - 1) / kC;
     for (int j = 0; j < from.rows; j++)
-      for_cells<Number> (
+      for_strips<kCells<Number>> (
           from.cells, false, [&] (int at, Put) CODEDEXPOSURE_INLINE_BODY {
             Whole<Number> all (0);
             for (int e = 0; e < linear.n; e++)
@@ -102,7 +89,7 @@ decode_slot (const Linear &decoder, const LinearTerm *first, int count,
   const LinearTerm *terms = Count > 0 ? few : first;
   for (int j = 0; j < elements.rows; j++) {
     const int row = j * elements.cells;
-    for_cells<Number> (elements.cells, stream,
+    for_strips<kCells<Number>> (elements.cells, stream,
         [&] (int at, Put put) CODEDEXPOSURE_INLINE_BODY {
           const int cell = row + at;
           const auto *start = starts.of (j, at);
@@ -156,7 +143,7 @@ decode_in_doubles (
     const Linear &linear, const Elements<From> &from, const Planes<T> &to)
 {
   for (int j = 0; j < from.rows; j++)
-    for_cells<double> (
+    for_strips<kCells<double>> (
         from.cells, false, [&] (int at, Put put) CODEDEXPOSURE_INLINE_BODY {
           const From *values = from.at + j * from.cells + at;
           const LinearTerm *term = linear.terms;
@@ -296,7 +283,7 @@ decode_differences (
   for (int j = 0; j < block.rows; j++) {
     for (int k = 0; k < Width * block.height; k++)
       out[k] = bytes_on (to.rows[k], j * to.stride);
-    for_strips<T> (block.cells, to.stream,
+    for_strips<kLanes<T>> (block.cells, to.stream,
         [&] (int at, Put put) CODEDEXPOSURE_INLINE_BODY {
           Vector<T> before = {};
           const T *row = bytes_on (block.pixels + at * Width,

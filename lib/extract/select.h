@@ -57,7 +57,7 @@ for_squares (const Block<T> &block, const Layout<T> &layout,
         layout.element + (j + layout.row) % layout.rows * kN;
     for (int p = 0; p < kN; p++)
       out[p] = bytes_on (to.rows[element[p]], j * to.stride);
-    for_strips<T> (block.cells, to.stream,
+    for_strips<kLanes<T>> (block.cells, to.stream,
         [&] (int at, Put put) CODEDEXPOSURE_INLINE_BODY {
           const T *row = bytes_on (block.pixels + at * Width,
               std::ptrdiff_t (j) * Width * block.stride);
@@ -115,7 +115,7 @@ select_rows (
       repeat_row = repeat_row + 1 < layout.rows ? repeat_row + 1 : 0;
       const T *row = bytes_on (
           block.pixels, (std::ptrdiff_t (j) * block.height + y) * block.stride);
-      for_strips<T> (block.cells, to.stream,
+      for_strips<kLanes<T>> (block.cells, to.stream,
           [&] (int at, Put put) CODEDEXPOSURE_INLINE_BODY {
             most =
                 larger (most, split_row<Width, T> (row + at * width, width, out,
@@ -164,7 +164,7 @@ select_relabelled (
   for (int j = 0; j < block.rows; j++) {
     const std::uint8_t *place =
         layout.place + (j + layout.row) % layout.rows * n * repeat;
-    for_strips<T> (block.cells, to.stream,
+    for_strips<kLanes<T>> (block.cells, to.stream,
         [&] (int at, Put put) CODEDEXPOSURE_INLINE_BODY {
           most = larger (most, split (block, j, at, places));
           for (int c = 0; c < repeat; c++)

@@ -58,7 +58,7 @@ rank_of (const Block<T> &block, const Layout<T> &layout, const Planes<T> &to)
   return for_chunks (
       block, layout, to, [&] (const Elements<T> &from, const Planes<T> &out) {
         for (int j = 0; j < from.rows; j++)
-          for_strips<T> (from.cells, out.stream,
+          for_strips<kLanes<T>> (from.cells, out.stream,
               [&] (int at, Put put) CODEDEXPOSURE_INLINE_BODY {
                 Vector<T> wires[N > 0 ? N : 256];
 #pragma GCC unroll 16

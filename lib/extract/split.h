@@ -139,18 +139,17 @@ struct Put {
   }
 };
 
-/** Calls body (at, put) for every vector of a row of cells; the last one is
- * moved back to end with the row. */
-template <typename T, typename Body>
+/** Calls body (at, put) for all cells of a row, Count at a time; the last ones
+ * are moved back to end with the row. */
+template <int Count, typename Body>
 CODEDEXPOSURE_INLINE void
 for_strips (int cells, bool stream, Body body)
 {
-  constexpr int kL = kLanes<T>;
   int at = 0;
-  for (; at + kL <= cells; at += kL)
+  for (; at + Count <= cells; at += Count)
     body (at, Put{stream});
   if (at < cells)
-    body (cells - kL, Put{false});
+    body (cells - Count, Put{false});
 }
 
 /* The widths of cells that are split by permutations. */

@@ -3,6 +3,7 @@
  */
 #pragma once
 
+#include "extract/split.h"
 #include "fuse/filter_kernel.h"
 
 namespace codedexposure::CODEDEXPOSURE_TARGET
@@ -16,26 +17,6 @@ struct InTurn {
     return First + lane / 2 + (lane % 2 ? Lanes : 0);
   }
 };
-
-template <int Period, typename V>
-CODEDEXPOSURE_INLINE void
-split_vectors (V *v)
-{
-  if constexpr (Period > 1) {
-    constexpr std::make_integer_sequence<int, kFloats> lanes;
-    V even[Period / 2], odd[Period / 2];
-    for (int i = 0; i < Period / 2; i++) {
-      even[i] = pick (v[2 * i], v[2 * i + 1], EverySecond<0> (), lanes);
-      odd[i] = pick (v[2 * i], v[2 * i + 1], EverySecond<1> (), lanes);
-    }
-    split_vectors<Period / 2> (even);
-    split_vectors<Period / 2> (odd);
-    for (int i = 0; i < Period / 2; i++) {
-      v[2 * i] = even[i];
-      v[2 * i + 1] = odd[i];
-    }
-  }
-}
 
 template <int Period>
 CODEDEXPOSURE_INLINE void
@@ -66,9 +47,7 @@ split_period (const fuse::Parts &parts, const T *from, T *to)
   int x = 0;
   for (; x + Period * kFloats <= parts.count; x += Period * kFloats) {
     Vector<T> v[Period];
-    for (int i = 0; i < Period; i++)
-      v[i] = load (from + x + i * kFloats);
-    split_vectors<Period> (v);
+    split_cells<Period, T> (from + x, v);
     for (int i = 0; i < Period; i++)
       store (to + i * parts.stride + x / Period, v[i]);
   }

@@ -53,11 +53,4 @@ private:
   Image<std::uint8_t> seen_;
 };
 
-extern template double BeamSum::add (ImageView<const std::uint8_t>,
-    ImageView<const std::uint8_t>, const BeamLevels &,
-    ImageView<std::uint8_t>) const;
-extern template double BeamSum::add (ImageView<const std::uint16_t>,
-    ImageView<const std::uint16_t>, const BeamLevels &,
-    ImageView<std::uint16_t>) const;
-
 } // namespace codedexposure

@@ -16,9 +16,4 @@ template <typename Pixel>
 void subtract_black (
     ImageView<const Pixel> frame, int black, int bits, ImageView<Pixel> light);
 
-extern template void subtract_black (
-    ImageView<const std::uint8_t>, int, int, ImageView<std::uint8_t>);
-extern template void subtract_black (
-    ImageView<const std::uint16_t>, int, int, ImageView<std::uint16_t>);
-
 } // namespace codedexposure

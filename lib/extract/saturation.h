@@ -14,9 +14,4 @@ namespace codedexposure
 template <typename Pixel>
 std::uint64_t count_saturated (ImageView<const Pixel> frame, int bits);
 
-extern template std::uint64_t count_saturated (
-    ImageView<const std::uint8_t>, int);
-extern template std::uint64_t count_saturated (
-    ImageView<const std::uint16_t>, int);
-
 } // namespace codedexposure

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "base/pixels.h"
+#include "base/targets.h"
 #include "base/text.h"
 #include "base/try.h"
 #include "base/view_check.h"
@@ -19,6 +20,9 @@
 
 namespace codedexposure
 {
+
+/* Plain x86-64 cannot permute bytes: the reference is as fast there. */
+CODEDEXPOSURE_SUPPORTED (supported_targets, extract, Target, sse4)
 
 namespace
 {
@@ -122,69 +126,56 @@ struct Extractor<Pixel>::Plan : ExtractPlan {
   std::optional<FastPath<Pixel>> fast = {};
 
   Result<void> check (ImageView<const Pixel> coded,
-      std::span<const ImageView<Pixel>> subframes) const;
-  ExtractReport run (ImageView<const Pixel> coded,
-      std::span<const ImageView<Pixel>> subframes) const;
-  void leave_out_regions (ImageView<const Pixel> coded,
-      std::span<const ImageView<Pixel>> subframes) const;
-};
-
-template <typename Pixel>
-Result<void>
-Extractor<Pixel>::Plan::check (ImageView<const Pixel> coded,
-    std::span<const ImageView<Pixel>> subframes) const
-{
-  std::array<ViewBytes, Tile::kMaxElements> outputs;
-  if (int (subframes.size ()) != grid.elements ())
-    return Error{std::to_string (subframes.size ()) +
-                 " views of subframes instead of " +
-                 std::to_string (grid.elements ())};
-  const ViewBytes input = ViewBytes::of (coded);
-  RETURN_IF_ERROR (
-      check_view (input, "coded frame", frame.width, frame.height));
-  for (std::size_t k = 0; k < subframes.size (); k++) {
-    outputs[k] = ViewBytes::of (subframes[k]);
+      std::span<const ImageView<Pixel>> subframes) const
+  {
+    std::array<ViewBytes, Tile::kMaxElements> outputs;
+    if (int (subframes.size ()) != grid.elements ())
+      return Error{std::to_string (subframes.size ()) +
+                   " views of subframes instead of " +
+                   std::to_string (grid.elements ())};
+    const ViewBytes input = ViewBytes::of (coded);
     RETURN_IF_ERROR (
-        check_view (outputs[k], "subframe", size.width, size.height));
+        check_view (input, "coded frame", frame.width, frame.height));
+    for (std::size_t k = 0; k < subframes.size (); k++) {
+      outputs[k] = ViewBytes::of (subframes[k]);
+      RETURN_IF_ERROR (
+          check_view (outputs[k], "subframe", size.width, size.height));
+    }
+    return check_apart (std::span (outputs).first (subframes.size ()), &input);
   }
-  return check_apart (std::span (outputs).first (subframes.size ()), &input);
-}
 
-template <typename Pixel>
-ExtractReport
-Extractor<Pixel>::Plan::run (ImageView<const Pixel> coded,
-    std::span<const ImageView<Pixel>> subframes) const
-{
-  if (fast)
-    return fast->run (coded, subframes);
-  switch (this->method) {
-  case Method::kDecode:
-    for (int j = 0; j < size.height; j++)
-      for (int i = 0; i < size.width; i++)
-        reference_decode (coded, grid, *decoder, linear->linear (), covered,
-            {i, j}, subframes);
-    break;
-  case Method::kSelect:
-    reference_select<Pixel> (coded, grid, elements, subframes);
-    break;
-  default:
-    reference_rank (coded, grid, subframes);
+  ExtractReport run (ImageView<const Pixel> coded,
+      std::span<const ImageView<Pixel>> subframes) const
+  {
+    if (fast)
+      return fast->run (coded, subframes);
+    switch (this->method) {
+    case Method::kDecode:
+      for (int j = 0; j < size.height; j++)
+        for (int i = 0; i < size.width; i++)
+          reference_decode (coded, grid, *decoder, linear->linear (), covered,
+              {i, j}, subframes);
+      break;
+    case Method::kSelect:
+      reference_select<Pixel> (coded, grid, elements, subframes);
+      break;
+    default:
+      reference_rank (coded, grid, subframes);
+    }
+    return {reference_saturated (coded, grid, largest, size.height)};
   }
-  return {reference_saturated (coded, grid, largest, size.height)};
-}
 
-template <typename Pixel>
-void
-Extractor<Pixel>::Plan::leave_out_regions (ImageView<const Pixel> coded,
-    std::span<const ImageView<Pixel>> subframes) const
-{
-  if (decoder && decoder->interpolates ())
-    for (const Offset cell : covered.neighbours ())
-      reference_decode (
-          coded, grid, *decoder, linear->linear (), covered, cell, subframes);
-  for (const ImageView<Pixel> &subframe : subframes)
-    covered.blacken (subframe);
-}
+  void leave_out_regions (ImageView<const Pixel> coded,
+      std::span<const ImageView<Pixel>> subframes) const
+  {
+    if (decoder && decoder->interpolates ())
+      for (const Offset cell : covered.neighbours ())
+        reference_decode (
+            coded, grid, *decoder, linear->linear (), covered, cell, subframes);
+    for (const ImageView<Pixel> &subframe : subframes)
+      covered.blacken (subframe);
+  }
+};
 
 template <typename Pixel>
 Result<Extractor<Pixel>>

@@ -424,7 +424,7 @@ SickBench::exposed_for (const Shot &shot) const
 }
 
 void
-SickBench::add_light (const Shot &shot, const LightWindow &window,
+SickBench::add_light (const Shot &shot, const ExposureLight &window,
     const Shown &shown, Passed &passed) const
 {
   const MirrorProgram &program = shown.program;
@@ -462,7 +462,7 @@ SickBench::add_light (const Shot &shot, const LightWindow &window,
 void
 SickBench::collect_rows (const Shot &shot, const Rows &rows)
 {
-  const LightWindow window (
+  const ExposureLight window (
       light_over_time_, shot.begin, shot.end, options_.switching);
   Passed passed;
   for (const Shown &shown : shown_)

@@ -12,8 +12,8 @@
 
 #include "base/image.h"
 #include "base/result.h"
+#include "bench/exposure_light.h"
 #include "bench/lens.h"
-#include "bench/light_window.h"
 #include "bench/processing.h"
 #include "bench/sick_options.h"
 #include "mapping/mapping.h"
@@ -134,7 +134,7 @@ private:
   Nanoseconds exposed_time () const;
   std::optional<Nanoseconds> next_trigger (Nanoseconds until);
   const Shot &exposed_for (const Shot &shot) const;
-  void add_light (const Shot &shot, const LightWindow &window,
+  void add_light (const Shot &shot, const ExposureLight &window,
       const Shown &shown, Passed &passed) const;
   /** Rows of the frame that are exposed together. */
   struct Rows {

@@ -13,6 +13,7 @@
 #include "common/messages.h"
 #include "pipeline/cameras.h"
 #include "pipeline/graph.h"
+#include "pipeline/pads.h"
 
 namespace codedexposure::app
 {
@@ -397,6 +398,18 @@ in_seconds (GstClockTime time)
   return format ("%.3f s", 1e-9 * double (time));
 }
 
+/* As --excerpt and the tables of pictures count. */
+std::string
+place_of (GstMessage *posted, GstClockTime time)
+{
+  GstObject *source = GST_MESSAGE_SRC (posted);
+  const ObjectPtr<GstPad> pad (
+      GST_IS_ELEMENT (source)
+          ? gst_element_get_static_pad (GST_ELEMENT (source), "src")
+          : nullptr);
+  return in_seconds (pad ? stream_time (pad.get (), time) : time);
+}
+
 std::string
 slip_text (int slots)
 {
@@ -415,7 +428,7 @@ notice (GstMessage *posted)
       is_of_second_camera (posted) ? " of the second camera" : "";
   if (const auto lost = from_structure<FramesLost> (message))
     return "warning: coded frames" + of + " were lost before " +
-           in_seconds (lost->to) + ": " + number (lost->count);
+           place_of (posted, lost->to) + ": " + number (lost->count);
   if (const auto incomplete = from_structure<FrameIncomplete> (message))
     return "warning: frame " + number (incomplete->frame) + of +
            " arrived incomplete; check the connection of the camera";
@@ -429,18 +442,18 @@ notice (GstMessage *posted)
   if (const auto damaged = from_structure<FramesDamaged> (message))
     return damaged->active
                ? "warning: from frame " + number (damaged->frame) + " (" +
-                     in_seconds (damaged->from) + ") on, frames" + of +
+                     place_of (posted, damaged->from) + ") on, frames" + of +
                      " are flagged: " + quoted (damaged->reason)
                : "warning: frames" + of + " that are flagged from frame " +
                      number (damaged->frame) +
                      " on: " + number (damaged->count.value_or (0));
   if (const auto lost = from_structure<PartnerLost> (message))
-    return lost->active ? "warning: from " + in_seconds (lost->from) +
+    return lost->active ? "warning: from " + place_of (posted, lost->from) +
                               " on, coded frames have no partner of the second "
                               "camera: " +
                               quoted (lost->reason)
                         : "warning: coded frames without a partner from " +
-                              in_seconds (lost->from) +
+                              place_of (posted, lost->from) +
                               " on: " + number (lost->frames.value_or (0));
   if (const auto drifted = from_structure<PartnerDrifted> (message))
     return drifted->active
@@ -454,7 +467,7 @@ notice (GstMessage *posted)
                  "them "
                  "again";
   if (const auto missing = from_structure<FramesMissing> (message))
-    return "warning: from " + in_seconds (missing->from) +
+    return "warning: from " + place_of (posted, missing->from) +
            " on, recorded frames" + of +
            " are missing: " + number (missing->count);
   if (from_structure<StreamCut> (message))

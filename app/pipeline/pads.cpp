@@ -47,6 +47,17 @@ segment_at (GstPad *pad)
   return event ? std::optional (*segment_of (event.get ())) : std::nullopt;
 }
 
+GstClockTime
+stream_time (GstPad *pad, GstClockTime time)
+{
+  const auto segment = segment_at (pad);
+  guint64 position = 0;
+  return segment && gst_segment_to_stream_time_full (
+                        &*segment, GST_FORMAT_TIME, time, &position) > 0
+             ? position
+             : time;
+}
+
 std::optional<GstVideoInfo>
 video_at (GstPad *pad)
 {

@@ -25,6 +25,8 @@ void watch_buffers (
 gst::ObjectPtr<GstElement> element_behind (GstPad *pad);
 /** None: no segment has come. */
 std::optional<GstSegment> segment_at (GstPad *pad);
+/** On the time axis of the recording, where positions count. */
+GstClockTime stream_time (GstPad *pad, GstClockTime time);
 /** None: no caps have come, or not those of raw video. */
 std::optional<GstVideoInfo> video_at (GstPad *pad);
 /** The events with tags that have come. */

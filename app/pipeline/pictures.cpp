@@ -70,15 +70,6 @@ first_name (const std::string &line)
              : line.substr (0, line.find (','));
 }
 
-/* On the time axis of the recording. */
-GstClockTime
-stream_time (GstPad *pad, GstClockTime time)
-{
-  const auto segment = segment_at (pad);
-  return segment ? gst_segment_to_stream_time (&*segment, GST_FORMAT_TIME, time)
-                 : time;
-}
-
 /* Whether @path is a PNG file up to its last chunk. */
 bool
 is_complete (const std::string &path)

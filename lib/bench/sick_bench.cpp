@@ -424,7 +424,7 @@ SickBench::exposed_for (const Shot &shot) const
 }
 
 void
-SickBench::add_light (const Shot &shot, const ExposureLight &window,
+SickBench::add_light (const Shot &shot, const ExposureLight &exposure,
     const Shown &shown, Passed &passed) const
 {
   const MirrorProgram &program = shown.program;
@@ -446,7 +446,7 @@ SickBench::add_light (const Shot &shot, const ExposureLight &window,
       if (kind == Shown::Kind::off)
         continue;
       const double light =
-          window.through (std::min (origin + stretch.begin, shown.stop),
+          exposure.through (std::min (origin + stretch.begin, shown.stop),
               std::min (origin + stretch.end, shown.stop));
       if (light == 0.0)
         continue;
@@ -462,14 +462,14 @@ SickBench::add_light (const Shot &shot, const ExposureLight &window,
 void
 SickBench::collect_rows (const Shot &shot, const Rows &rows)
 {
-  const ExposureLight window (
+  const ExposureLight exposure (
       light_over_time_, shot.begin, shot.end, options_.switching);
   Passed passed;
   for (const Shown &shown : shown_)
-    add_light (shot, window, shown, passed);
+    add_light (shot, exposure, shown, passed);
   const double unit =
       1e-9 * double (options_.rate.period () - options_.readout);
-  double dark = window.whole () - passed.on;
+  double dark = exposure.whole () - passed.on;
   for (const auto &[mask, light] : passed.pictures)
     dark -= light;
   const float on = float (passed.on / unit), off = float (dark / unit);

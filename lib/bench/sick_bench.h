@@ -134,7 +134,7 @@ private:
   Nanoseconds exposed_time () const;
   std::optional<Nanoseconds> next_trigger (Nanoseconds until);
   const Shot &exposed_for (const Shot &shot) const;
-  void add_light (const Shot &shot, const ExposureLight &window,
+  void add_light (const Shot &shot, const ExposureLight &exposure,
       const Shown &shown, Passed &passed) const;
   /** Rows of the frame that are exposed together. */
   struct Rows {

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /* codedexposure-demux: segments, flushes, gaps, the end of a stream, and runs.
  */
+#include <optional>
+
 #include "demux_time.h"
 
 namespace
@@ -10,7 +12,16 @@ using namespace codedexposure;
 using namespace codedexposure::gst;
 using namespace codedexposure::test;
 
-using DemuxStream = DemuxTime;
+class DemuxStream : public DemuxTime
+{
+protected:
+  /** On "src"; none: it got no more. */
+  std::optional<GstSegment> next_segment ()
+  {
+    const EventPtr event = demux->pull_event (GST_EVENT_SEGMENT);
+    return event ? std::optional (*segment_of (event.get ())) : std::nullopt;
+  }
+};
 
 TEST_F (DemuxStream, ReversePlaybackGivesTheLastSubframeFirst)
 {
@@ -70,10 +81,8 @@ TEST_F (DemuxStream, NewSegmentIsGivenOnUnchangedAndNoLoss)
   push (5 * GST_SECOND);
   EXPECT_EQ (counter ("frames-lost"), 0u);
   EXPECT_EQ (discont_times (), (std::vector<int>{-5000, 5010, 5020, 5030}));
-  const EventPtr event = demux->pull_event (GST_EVENT_SEGMENT);
-  ASSERT_TRUE (event);
-  const GstSegment *segment = nullptr;
-  gst_event_parse_segment (event.get (), &segment);
+  const auto segment = next_segment ();
+  ASSERT_TRUE (segment);
   EXPECT_EQ (segment->start, 5 * GST_SECOND);
   EXPECT_EQ (segment->stop, 9 * GST_SECOND);
 }
@@ -88,10 +97,8 @@ TEST_F (DemuxStream, SegmentThatAFlushEndedIsNeverSeenDownstream)
   push (10 * GST_SECOND);
 
   EXPECT_EQ (discont_times (), (std::vector<int>{-10000, 10010, 10020, 10030}));
-  const EventPtr event = demux->pull_event (GST_EVENT_SEGMENT);
-  ASSERT_TRUE (event);
-  const GstSegment *segment = nullptr;
-  gst_event_parse_segment (event.get (), &segment);
+  const auto segment = next_segment ();
+  ASSERT_TRUE (segment);
   EXPECT_EQ (segment->start, 10 * GST_SECOND);
   EXPECT_FALSE (demux->pull_event (GST_EVENT_SEGMENT));
 }
@@ -172,10 +179,8 @@ TEST_F (DemuxStream, SegmentBeforeTheStreamStartHoldsForItsFrames)
   demux->push_event (gst_event_new_stream_start ("again"));
   push (3 * GST_SECOND);
   EXPECT_EQ (discont_times (), (std::vector<int>{-3000, 3010, 3020, 3030}));
-  const EventPtr event = demux->pull_event (GST_EVENT_SEGMENT);
-  ASSERT_TRUE (event);
-  const GstSegment *segment = nullptr;
-  gst_event_parse_segment (event.get (), &segment);
+  const auto segment = next_segment ();
+  ASSERT_TRUE (segment);
   EXPECT_EQ (segment->start, 3 * GST_SECOND);
 }
 

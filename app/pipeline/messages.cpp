@@ -400,7 +400,7 @@ in_seconds (GstClockTime time)
 
 /* As --excerpt and the tables of pictures count. */
 std::string
-place_of (GstMessage *posted, GstClockTime time)
+position_of (GstMessage *posted, GstClockTime time)
 {
   GstObject *source = GST_MESSAGE_SRC (posted);
   const ObjectPtr<GstPad> pad (
@@ -428,7 +428,7 @@ notice (GstMessage *posted)
       is_of_second_camera (posted) ? " of the second camera" : "";
   if (const auto lost = from_structure<FramesLost> (message))
     return "warning: coded frames" + of + " were lost before " +
-           place_of (posted, lost->to) + ": " + number (lost->count);
+           position_of (posted, lost->to) + ": " + number (lost->count);
   if (const auto incomplete = from_structure<FrameIncomplete> (message))
     return "warning: frame " + number (incomplete->frame) + of +
            " arrived incomplete; check the connection of the camera";
@@ -442,18 +442,18 @@ notice (GstMessage *posted)
   if (const auto damaged = from_structure<FramesDamaged> (message))
     return damaged->active
                ? "warning: from frame " + number (damaged->frame) + " (" +
-                     place_of (posted, damaged->from) + ") on, frames" + of +
+                     position_of (posted, damaged->from) + ") on, frames" + of +
                      " are flagged: " + quoted (damaged->reason)
                : "warning: frames" + of + " that are flagged from frame " +
                      number (damaged->frame) +
                      " on: " + number (damaged->count.value_or (0));
   if (const auto lost = from_structure<PartnerLost> (message))
-    return lost->active ? "warning: from " + place_of (posted, lost->from) +
+    return lost->active ? "warning: from " + position_of (posted, lost->from) +
                               " on, coded frames have no partner of the second "
                               "camera: " +
                               quoted (lost->reason)
                         : "warning: coded frames without a partner from " +
-                              place_of (posted, lost->from) +
+                              position_of (posted, lost->from) +
                               " on: " + number (lost->frames.value_or (0));
   if (const auto drifted = from_structure<PartnerDrifted> (message))
     return drifted->active
@@ -467,7 +467,7 @@ notice (GstMessage *posted)
                  "them "
                  "again";
   if (const auto missing = from_structure<FramesMissing> (message))
-    return "warning: from " + place_of (posted, missing->from) +
+    return "warning: from " + position_of (posted, missing->from) +
            " on, recorded frames" + of +
            " are missing: " + number (missing->count);
   if (from_structure<StreamCut> (message))

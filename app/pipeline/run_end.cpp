@@ -39,7 +39,8 @@ Run::say_no_frame ()
     status_.line (
         "no coded frame lies in this part of the recording" +
         (job_.times.start
-                ? format (", from %g s on; check whether that is after its end",
+                ? format (", from %g s on; check whether frames were lost "
+                          "there, or the recording ends before it",
                       double (*job_.times.start) / double (GST_SECOND))
                 : ""));
   else if (interrupted_ && exit_ != Exit::interrupted)

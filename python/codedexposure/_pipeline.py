@@ -140,30 +140,43 @@ _DROPPED = {
 }
 
 
-def _loss_in(structure) -> str | None:
+def _position(message, name: str) -> str:
+    """A time of an element message, as Frame.time counts."""
+    time = message.get_structure().get_value(name)
+    pad = message.src.get_static_pad("src")
+    segment = pad and pad.get_sticky_event(Gst.EventType.SEGMENT, 0)
+    if segment:
+        sign, position = segment.parse_segment().to_stream_time_full(
+            Gst.Format.TIME, time)
+        time = position if sign > 0 else time
+    return f"{time * 1e-9:.3f} s"
+
+
+def _loss_in(message) -> str | None:
     """What an element message says of lost or damaged frames."""
+    structure = message.get_structure()
     name, value = structure.get_name(), structure.get_value
     of = " of the second camera" if structure.has_field("camera") else ""
     if name == "codedexposure/frames-lost":
-        return (f"coded frames{of} were lost before {value('to') * 1e-9:.3f} s: "
-                f"{value('count')}")
+        return (f"coded frames{of} were lost before "
+                f"{_position(message, 'to')}: {value('count')}")
     if name == "dmdsync/frame-dropped" and value("reason") in _DROPPED:
         return (f"coded frame {value('frame')}{of} was dropped: "
                 f"{_DROPPED[value('reason')]}")
     if name == "codedexposure/frames-damaged" and value("active"):
-        return (f"from frame {value('frame')} ({value('from') * 1e-9:.3f} s) "
+        return (f"from frame {value('frame')} ({_position(message, 'from')}) "
                 f"on, frames{of} are corrupted: {value('reason')}")
     if name == "codedexposure/frames-damaged":
         return (f"corrupted frames{of} from frame {value('frame')} on: "
                 f"{value('count')}")
     if name == "codedexposure/frames-missing":
-        return (f"from {value('from') * 1e-9:.3f} s on, recorded frames{of} are "
+        return (f"from {_position(message, 'from')} on, recorded frames{of} are "
                 f"missing: {value('count')}")
     if name == "codedexposure/not-coded":
-        return (f"from {value('from') * 1e-9:.3f} s on, the mirrors show "
+        return (f"from {_position(message, 'from')} on, the mirrors show "
                 f"{value('pattern')} and frames are not decoded")
     if name == "codedexposure/partner-lost" and not value("active"):
-        return (f"from {value('from') * 1e-9:.3f} s on, coded frames have no "
+        return (f"from {_position(message, 'from')} on, coded frames have no "
                 f"complement ({value('reason')}): {value('frames')}")
     if name == "codedexposure/stream-cut":
         return (f"the stream{of} ended without its last line: it was cut off, its "
@@ -259,9 +272,9 @@ class Player:
             error, debug = message.parse_warning()
             self.warn(_text_of(message, error, debug))
         elif message.type == Gst.MessageType.ELEMENT:
-            structure = message.get_structure()
-            self.was_cut |= structure.get_name() == "codedexposure/stream-cut"
-            text = _loss_in(structure)
+            self.was_cut |= message.get_structure().get_name() \
+                == "codedexposure/stream-cut"
+            text = _loss_in(message)
             if text:
                 self.warn(text)
 

@@ -72,6 +72,15 @@ class Sequence(unittest.TestCase):
             self.check(recording.subframes())
             self.check(recording.fused("fast"))
 
+    def test_warnings_say_times_of_frames(self):
+        """Those of the file begin at 6.4 s."""
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always", codedexposure.RecordingWarning)
+            frames = list(opened("camera.mkv").coded())
+        after = next(frame for frame in frames if frame.lost_before)
+        self.assertIn(f"were lost before {after.time:.3f} s: 20",
+                      str(said[0].message))
+
     def test_of_a_bench(self):
         self.check_all("plain.mkv")
 

@@ -2,7 +2,6 @@
 #include "sync/rate_watch.h"
 
 #include <cmath>
-#include <utility>
 
 #include "base/statistics.h"
 
@@ -12,7 +11,7 @@ namespace codedexposure
 namespace
 {
 
-constexpr std::size_t kSteps = 64;
+constexpr std::size_t kSteps = 64, kFirstSteps = 24;
 
 /* Mean of the steps near their median, which skips those over a loss and those
  * before and after a frame that came late. */
@@ -45,12 +44,6 @@ measure (const std::vector<Nanoseconds> &steps)
   return 1e9 * periods / span;
 }
 
-bool
-differ (double a, double b)
-{
-  return std::abs (a - b) > RateWatch::kTolerance * b;
-}
-
 } // namespace
 
 std::optional<double>
@@ -59,12 +52,18 @@ RateWatch::take (Nanoseconds time)
   if (last_ && time > *last_)
     steps_.push_back (time - *last_);
   last_ = time;
-  if (steps_.size () < kSteps)
+  const bool is_rough = is_first_;
+  if (steps_.size () < (is_rough ? kFirstSteps : kSteps))
     return std::nullopt;
 
-  const double rate = measure (std::exchange (steps_, {}));
-  const double announced = double (announced_.num) / announced_.den;
-  if (!differ (rate, reported_ > 0 ? reported_ : announced))
+  is_first_ = false;
+  const double rate = measure (steps_);
+  if (!is_rough)
+    steps_.clear ();
+  const double known =
+      reported_ > 0 ? reported_ : double (announced_.num) / announced_.den;
+  if (std::abs (rate - known) <=
+      (is_rough ? kRoughTolerance : kTolerance) * known)
     return std::nullopt;
   reported_ = rate;
   return rate;

@@ -12,8 +12,8 @@ namespace codedexposure
 
 /**
  * Measures the frame rate from the times of frames, in spite of jitter and
- * losses, over 64 steps at a time. A camera with an external trigger may run at
- * another rate than the requested one.
+ * losses, over 64 steps at a time, and roughly over the first 24. A camera with
+ * an external trigger may run at another rate than the requested one.
  */
 class RateWatch
 {
@@ -21,6 +21,9 @@ public:
   /** Smaller relative differences are ignored: it is more than the error of any
    * clock, and than the effect of a jitter of a quarter period. */
   static constexpr double kTolerance = 0.01;
+  /** The same over the first 24 steps, where a frame that is held up weighs
+   * more. */
+  static constexpr double kRoughTolerance = 0.25;
 
   explicit RateWatch (FrameRate announced) : announced_ (announced) {}
 
@@ -34,7 +37,8 @@ private:
   FrameRate announced_;
   std::optional<Nanoseconds> last_;
   std::vector<Nanoseconds> steps_;
-  double reported_ = 0; // 0: the announced one
+  double reported_ = 0;  // 0: the announced one
+  bool is_first_ = true; // of the steps
 };
 
 } // namespace codedexposure

@@ -86,3 +86,16 @@ TEST (RateWatch, AGapThatIsNoneIsNotMeasured)
     watch.resync ();
   }
 }
+
+/* Many recordings end before the rate is known to 1 %. */
+TEST (RateWatch, TellsAHalfOrDoubleRateSoon)
+{
+  for (const FrameRate real : {FrameRate{50, 1}, FrameRate{25, 2}}) {
+    RateWatch watch ({25, 1});
+    for (int k = 0; k < 24; k++)
+      EXPECT_FALSE (watch.take (real.time_of (k))) << k;
+    const auto rate = watch.take (real.time_of (24));
+    ASSERT_TRUE (rate);
+    EXPECT_NEAR (*rate * real.den / real.num, 1, 1e-6);
+  }
+}

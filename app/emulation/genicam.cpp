@@ -216,8 +216,10 @@ write_description (const GigeCameraOptions &options)
   const int descriptor =
       g_file_open_tmp ("codedexposure-XXXXXX.xml", &name, nullptr);
   if (descriptor < 0)
-    return Error{"no temporary file can be written for the description of the "
-                 "simulated camera"};
+    return Error{std::string ("the description of the simulated camera cannot "
+                              "be written to ") +
+                 g_get_tmp_dir () +
+                 "; set TMPDIR to a folder that can be written to"};
   const std::string path = name;
   g_free (name);
   g_close (descriptor, nullptr);

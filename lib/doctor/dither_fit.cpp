@@ -46,7 +46,8 @@ public:
   Model (
       const std::vector<DitherGroup> &groups, double part, const Measured &gain)
       : groups_ (groups), part_ (part), per_gain_ (1.0 / gain.value),
-        per_gain_sigma_ (gain.sigma / (gain.value * gain.value))
+        per_gain_sigma_ (gain.sigma / (gain.value * gain.value)),
+        expected_ (groups.size ())
   {
     for (const DitherGroup &group : groups)
       looks_ = std::max (looks_, group.look + 1);
@@ -81,8 +82,9 @@ public:
   void weigh (const Numbers &n)
   {
     errors_.clear ();
-    for (const DitherGroup &group : groups_) {
-      const RoundedMoments e = expected (group, n);
+    for (std::size_t g = 0; g < groups_.size (); g++) {
+      const DitherGroup &group = groups_[g];
+      const RoundedMoments &e = expected (g, n);
       const double values = group.pixels * group.frames;
       const double square = e.variance * e.variance;
       const double one = 1.0 / values; // a single value that differs
@@ -101,7 +103,7 @@ public:
     Eigen::VectorXd rest (Eigen::Index (2 * groups_.size () + 1) + looks_);
     Eigen::Index i = 0;
     for (std::size_t g = 0; g < groups_.size (); g++) {
-      const RoundedMoments e = expected (groups_[g], n);
+      const RoundedMoments &e = expected (g, n);
       rest[i++] = (groups_[g].mean - e.mean) / errors_[g].first;
       rest[i++] = (groups_[g].variance - e.variance) / errors_[g].second;
     }
@@ -112,17 +114,42 @@ public:
   }
 
 private:
-  RoundedMoments expected (const DitherGroup &group, const Numbers &n) const
+  /* What moments depend on: mean, sigma, third moment, spread. */
+  using Causes = std::array<double, 4>;
+  struct Expected {
+    Causes causes;
+    RoundedMoments moments;
+  };
+
+  /* Light of a look does nothing to the groups of others. */
+  const RoundedMoments &expected (std::size_t group, const Numbers &n) const
+  {
+    const Causes causes = causes_of (groups_[group], n);
+    auto &[last, before] = expected_[group];
+    if (last.causes != causes) {
+      std::swap (last, before);
+      if (last.causes != causes)
+        last = {causes, moments_of (causes)};
+    }
+    return last.moments;
+  }
+
+  Causes causes_of (const DitherGroup &group, const Numbers &n) const
   {
     const double light = n[kLooks + group.look] * group.light +
                          (group.longer ? 1.0 : part_) * group.field * n[kOff];
     const double shot = std::max (0.0, light) * n[kPerGain];
-    const double sigma = std::sqrt (std::max (1e-6, n[kVariance] + shot));
-    const double spread = std::clamp (n[kSpread], 0.0, kMostSpread);
+    return {n[kBlack] + light, std::sqrt (std::max (1e-6, n[kVariance] + shot)),
+        shot * n[kPerGain], std::clamp (n[kSpread], 0.0, kMostSpread)};
+  }
+
+  static RoundedMoments moments_of (const Causes &causes)
+  {
+    const auto [mean, sigma, third, spread] = causes;
     RoundedMoments sum;
     for (std::size_t i = 0; i < kOffsets.size (); i++) {
-      const RoundedMoments one = rounded_moments (
-          n[kBlack] + light + kOffsets[i] * spread, sigma, shot * n[kPerGain]);
+      const RoundedMoments one =
+          rounded_moments (mean + kOffsets[i] * spread, sigma, third);
       sum.mean += kWeights[i] * one.mean;
       sum.variance += kWeights[i] * one.variance;
       sum.fourth += kWeights[i] * one.fourth;
@@ -134,6 +161,7 @@ private:
   double part_, per_gain_, per_gain_sigma_;
   int looks_ = 0;
   std::vector<std::pair<double, double>> errors_;
+  mutable std::vector<std::array<Expected, 2>> expected_; // the last of each
 };
 
 } // namespace

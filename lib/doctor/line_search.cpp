@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <map>
 #include <numbers>
 
 #include "estimate/least_squares.h"
@@ -45,48 +46,96 @@ solve (double cc, double cs, double ss, double rc, double rs)
   return {a, b, a * rc + b * rs};
 }
 
-/** Light of a line of unit depth in each sample, at growing frequencies. */
+/** Frequencies that are looked at together. */
+constexpr int kLanes = 4;
+using Lanes = Eigen::Array<double, kLanes, 1>;
+
+/** The turns of one time, at kLanes frequencies. */
+struct Turns {
+  Lanes cosine = Lanes::Zero (), sine = Lanes::Zero ();
+
+  void turn (std::complex<double> by)
+  {
+    const Lanes was = cosine;
+    cosine = was * by.real () - sine * by.imag ();
+    sine = was * by.imag () + sine * by.real ();
+  }
+
+  void add (double weight, const Turns &middle, const Lanes &half)
+  {
+    const Lanes light = weight * half;
+    cosine += light * middle.cosine;
+    sine += light * middle.sine;
+  }
+};
+
+/** Sums over the samples of the light of a line and of the residual. */
+struct Sums {
+  Lanes cc = Lanes::Zero (), cs = cc, ss = cc, rc = cc, rs = cc;
+
+  void add (const Turns &light, double residual)
+  {
+    cc += light.cosine * light.cosine;
+    cs += light.cosine * light.sine;
+    ss += light.sine * light.sine;
+    rc += residual * light.cosine;
+    rs += residual * light.sine;
+  }
+};
+
+/** Light of a line in each sample, at growing frequencies. */
 class Comb
 {
 public:
   Comb (const LineSearch &search, double frequency, double step)
-      : lit_ (search.lit), frequency_ (frequency), step_ (step),
-        phasors_ (2 * lit_.size ()), turns_ (phasors_.size ())
+      : lit_ (search.lit)
   {
-    for (Index i = 0; i < phasors_.size (); i++) {
-      const LitTime &time = lit_[std::size_t (i / 2)];
-      const double edge = i % 2 == 0 ? time.from : time.until;
-      phasors_[i] = std::polar (1.0, kTurn * frequency * edge);
-      turns_[i] = std::polar (1.0, kTurn * step * edge);
+    std::map<double, std::size_t> halves; // of the lengths, which are few
+    const auto begin = [&] (double time) {
+      const Lanes angles =
+          kTurn * time * (frequency + step * Lanes::LinSpaced (0, kLanes - 1));
+      turns_.push_back ({angles.cos (), angles.sin ()});
+      steps_.push_back (std::polar (1.0, kTurn * kLanes * step * time));
+    };
+    for (const LitTime &time : lit_) {
+      begin (0.5 * (time.from + time.until));
+      const double half = 0.5 * (time.until - time.from);
+      const auto [known, fresh] = halves.try_emplace (half, halves.size ());
+      half_of_.push_back (lit_.size () + known->second);
     }
+    std::vector<double> times (halves.size ());
+    for (const auto &[half, place] : halves)
+      times[place] = half;
+    std::ranges::for_each (times, begin);
   }
 
-  double frequency () const { return frequency_; }
-
-  void fill (VectorXd &cosine, VectorXd &sine) const
+  /** Of a line of unit depth, but for a factor of each frequency. */
+  Sums sums (const VectorXd &residual) const
   {
-    cosine.setZero ();
-    sine.setZero ();
-    const double turn = 1.0 / (kTurn * frequency_);
-    for (Index i = 0; i < phasors_.size (); i += 2) {
-      const LitTime &time = lit_[std::size_t (i / 2)];
-      const std::complex<double> light =
-          turn * time.weight * (phasors_[i + 1] - phasors_[i]);
-      cosine[time.sample] += light.imag ();
-      sine[time.sample] -= light.real ();
+    Sums sums;
+    for (std::size_t i = 0; i < lit_.size ();) {
+      const int sample = lit_[i].sample;
+      Turns light;
+      for (; i < lit_.size () && lit_[i].sample == sample; i++)
+        light.add (lit_[i].weight, turns_[i], turns_[half_of_[i]].sine);
+      sums.add (light, residual[sample]);
     }
+    return sums;
   }
 
   void next ()
   {
-    frequency_ += step_;
-    phasors_ *= turns_;
+    for (std::size_t i = 0; i < turns_.size (); i++)
+      turns_[i].turn (steps_[i]);
   }
 
 private:
   const std::vector<LitTime> &lit_;
-  double frequency_, step_;
-  Eigen::ArrayXcd phasors_, turns_; // of both ends of each time, and of a step
+  std::vector<std::size_t> half_of_; // place of half the length of each
+  /* Of the middle of each time, then of half the lengths; and by how much they
+   * turn from one kLanes frequencies to the next. */
+  std::vector<Turns> turns_;
+  std::vector<std::complex<double>> steps_;
 };
 
 /** The residual without what other parameters explain. */
@@ -104,8 +153,14 @@ public:
 
   Amplitudes at (double frequency) const
   {
-    VectorXd cosine (residual_.size ()), sine (residual_.size ());
-    Comb (search_, frequency, 0.0).fill (cosine, sine);
+    VectorXd cosine = VectorXd::Zero (residual_.size ()), sine = cosine;
+    const double turn = 1.0 / (kTurn * frequency);
+    for (const LitTime &time : search_.lit) {
+      const double from = time.from / turn, until = time.until / turn;
+      const double part = turn * time.weight;
+      cosine[time.sample] += part * (std::sin (until) - std::sin (from));
+      sine[time.sample] -= part * (std::cos (until) - std::cos (from));
+    }
     cosine -= basis_ * (basis_.transpose () * cosine);
     sine -= basis_ * (basis_.transpose () * sine);
     return solve (cosine.squaredNorm (), cosine.dot (sine), sine.squaredNorm (),
@@ -149,19 +204,24 @@ quick_peaks (const LineSearch &search, const VectorXd &residual, double slowest,
 {
   std::vector<Peak> peaks;
   Peak before, last;
-  VectorXd cosine (residual.size ()), sine (residual.size ());
-  for (Comb comb (search, slowest, step); comb.frequency () <= fastest;
-       comb.next ()) {
-    comb.fill (cosine, sine);
-    const Amplitudes found = solve (cosine.squaredNorm (), cosine.dot (sine),
-        sine.squaredNorm (), cosine.dot (residual), sine.dot (residual));
+  const double squares = std::max (1e-30, residual.squaredNorm ());
+  const auto add = [&] (const Peak &found) {
     if (spectrum)
-      add_to_spectrum (*spectrum, slowest, fastest, comb.frequency (),
-          found.power / std::max (1e-30, residual.squaredNorm ()));
+      add_to_spectrum (
+          *spectrum, slowest, fastest, found.frequency, found.power / squares);
     if (last.power > before.power && last.power >= found.power)
       peaks.push_back (last);
     before = last;
-    last = {comb.frequency (), found.power};
+    last = found;
+  };
+  Comb comb (search, slowest, step);
+  const int count = int ((fastest - slowest) / step) + 1;
+  for (int i = 0; i < count; i += kLanes, comb.next ()) {
+    const Sums sums = comb.sums (residual);
+    for (int k = 0; k < std::min (kLanes, count - i); k++)
+      add ({slowest + (i + k) * step,
+          solve (sums.cc[k], sums.cs[k], sums.ss[k], sums.rc[k], sums.rs[k])
+              .power});
   }
   peaks.push_back (last);
   const std::size_t kept = std::min (peaks.size (), kPeaks);

@@ -20,7 +20,7 @@ struct LitTime {
 };
 
 struct LineSearch {
-  std::vector<LitTime> lit;
+  std::vector<LitTime> lit; // in the order of the samples
   /** What remains of each sample without the line, in seconds of light times
    * its weight. */
   Eigen::VectorXd residual;

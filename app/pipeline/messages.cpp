@@ -439,14 +439,17 @@ notice (GstMessage *posted)
     return "warning: from frame " + number (slip->frame) + of +
            " on, the mirrors are " + slip_text (slip->slots) +
            "; these frames are flagged";
-  if (const auto damaged = from_structure<FramesDamaged> (message))
+  if (const auto damaged = from_structure<FramesDamaged> (message)) {
+    const std::string at = position_of (posted, damaged->from);
+    const std::string frame =
+        damaged->frame ? "frame " + number (*damaged->frame) : at;
     return damaged->active
-               ? "warning: from frame " + number (damaged->frame) + " (" +
-                     position_of (posted, damaged->from) + ") on, frames" + of +
-                     " are flagged: " + quoted (damaged->reason)
-               : "warning: frames" + of + " that are flagged from frame " +
-                     number (damaged->frame) +
+               ? "warning: from " + frame +
+                     (damaged->frame ? " (" + at + ")" : "") + " on, frames" +
+                     of + " are flagged: " + quoted (damaged->reason)
+               : "warning: frames" + of + " that are flagged from " + frame +
                      " on: " + number (damaged->count.value_or (0));
+  }
   if (const auto lost = from_structure<PartnerLost> (message))
     return lost->active ? "warning: from " + position_of (posted, lost->from) +
                               " on, coded frames have no partner of the second "

@@ -198,7 +198,7 @@ struct CameraBack {
 struct FramesDamaged {
   static constexpr const char *kName = "codedexposure/frames-damaged";
   bool active = false;               ///< it begins
-  guint64 frame = 0;                 ///< the first of them
+  std::optional<guint64> frame = {}; ///< the first of them; none: not known
   std::optional<guint64> count = {}; ///< at the end: how many there were
   GstClockTime from = 0;
   std::string reason = {}; ///< of the first

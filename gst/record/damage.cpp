@@ -26,8 +26,8 @@ DamageReport::count (guint64 Counters::*counter, guint64 by)
 }
 
 void
-DamageReport::frame_flagged (
-    bool known, guint64 number, GstClockTime pts, const char *reason)
+DamageReport::frame_flagged (bool known, std::optional<guint64> number,
+    GstClockTime pts, const char *reason)
 {
   count (known ? &Counters::frames_damaged : &Counters::frames_unknown);
   if (!open_) {

@@ -124,13 +124,20 @@ void
 mark_unknown (RestoreState &state, GstBuffer *frame)
 {
   const bool has_track = state.track.is_linked ();
-  FrameMeta meta;
-  meta.frame = state.last_frame ? *state.last_frame + 1 : 0;
+  std::optional<guint64> number;
+  if (state.last_frame)
+    number = *state.last_frame + 1;
+  else if (GST_BUFFER_PTS_IS_VALID (frame))
+    number = state.track.read ([frame] (const TrackReader &reader) {
+      return reader.number_at (Nanoseconds (GST_BUFFER_PTS (frame)));
+    });
+  if (!number && state.whole)
+    number = 0;
   if (has_track)
-    set_frame_meta (frame, meta);
-  state.last_frame = meta.frame;
+    set_frame_meta (frame, {.frame = number.value_or (0)});
+  state.last_frame = number;
   GST_BUFFER_FLAG_SET (frame, GST_BUFFER_FLAG_CORRUPTED);
-  state.damage.frame_flagged (false, meta.frame, GST_BUFFER_PTS (frame),
+  state.damage.frame_flagged (false, number, GST_BUFFER_PTS (frame),
       !has_track                        ? "its track is missing"
       : GST_BUFFER_PTS_IS_VALID (frame) ? "the track has no line for it"
                                         : "it has no time to find its line by");

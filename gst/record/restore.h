@@ -104,8 +104,8 @@ public:
   void frame () { count (&Counters::frames); }
   /** At @p pts; @p reason says what is not as recorded, or why nothing is
    * @p known of it. */
-  void frame_flagged (
-      bool known, guint64 number, GstClockTime pts, const char *reason);
+  void frame_flagged (bool known, std::optional<guint64> number,
+      GstClockTime pts, const char *reason);
   /** It came before: another one did not. */
   void frame_repeated () { repeated_++; }
   /** Before the frame at @p pts, when @p record was made. After a seek, frames

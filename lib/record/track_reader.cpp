@@ -175,6 +175,21 @@ TrackReader::take_now (Nanoseconds pts, Nanoseconds start)
   return place == lines_.end () ? Match () : take_until (place, start);
 }
 
+std::optional<std::uint64_t>
+TrackReader::number_at (Nanoseconds pts) const
+{
+  const auto after = std::ranges::find_if (
+      lines_, [pts] (const Line &line) { return line.pts > pts; });
+  if (after == lines_.end ())
+    return std::nullopt;
+  const FrameRecord &record = *after->line.frame;
+  const Nanoseconds period =
+      std::max<Nanoseconds> (record.duration.value_or (after->duration), 1);
+  const auto frames = std::max<std::uint64_t> (
+      std::uint64_t ((after->pts - pts + period / 2) / period), 1);
+  return record.frame - std::min (record.frame, frames);
+}
+
 TrackReader::Match
 TrackReader::take_rest (Nanoseconds start, Nanoseconds until)
 {

@@ -80,6 +80,9 @@ public:
   Match take_rest (Nanoseconds start,
       Nanoseconds until = std::numeric_limits<Nanoseconds>::max ());
 
+  /** Of a frame without a line: counted back from the line after @p pts by the
+   * time between them; none: no such line has come. */
+  std::optional<std::uint64_t> number_at (Nanoseconds pts) const;
   /** How many frames the last line says the stream has. */
   std::optional<std::uint64_t> frames () const { return frames_; }
 

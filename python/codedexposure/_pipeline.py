@@ -163,12 +163,13 @@ def _loss_in(message) -> str | None:
     if name == "dmdsync/frame-dropped" and value("reason") in _DROPPED:
         return (f"coded frame {value('frame')}{of} was dropped: "
                 f"{_DROPPED[value('reason')]}")
-    if name == "codedexposure/frames-damaged" and value("active"):
-        return (f"from frame {value('frame')} ({_position(message, 'from')}) "
-                f"on, frames{of} are corrupted: {value('reason')}")
     if name == "codedexposure/frames-damaged":
-        return (f"corrupted frames{of} from frame {value('frame')} on: "
-                f"{value('count')}")
+        first = _position(message, "from")
+        if structure.has_field("frame"):
+            first = f"frame {value('frame')} ({first})"
+        return (f"from {first} on, frames{of} are corrupted: {value('reason')}"
+                if value("active") else
+                f"corrupted frames{of} from {first} on: {value('count')}")
     if name == "codedexposure/frames-missing":
         return (f"from {_position(message, 'from')} on, recorded frames{of} are "
                 f"missing: {value('count')}")

@@ -74,6 +74,27 @@ TEST_F (Restore, AFrameWithoutItsLineIsCorrupted)
   ASSERT_TRUE (file.posted<FramesDamaged> ());
 }
 
+TEST_F (Restore, AFirstFrameWithoutItsLineIsNumberedByTheNextOne)
+{
+  play (-1, 0);
+  EXPECT_EQ (get_frame_meta (restored.at (0).get ())->frame, 10u);
+  EXPECT_EQ (file.posted<FramesDamaged> ()->frame, 10u);
+}
+
+TEST_F (Restore, AfterASeekTheNumberOfAFrameWithoutALineIsNotSaid)
+{
+  file.push_event (gst_event_new_flush_start ());
+  file.push_event (gst_event_new_flush_stop (TRUE));
+  GstSegment segment;
+  gst_segment_init (&segment, GST_FORMAT_TIME);
+  file.push_event (gst_event_new_segment (&segment));
+  push_frame (5);
+  end ();
+  const auto begin = file.posted<FramesDamaged> ();
+  ASSERT_TRUE (begin);
+  EXPECT_FALSE (begin->frame);
+}
+
 TEST_F (Restore, AFrameWithoutATimeIsCorruptedAndKeepsItsPlace)
 {
   GST_BUFFER_PTS (recording.frames[1].get ()) = GST_CLOCK_TIME_NONE;

@@ -201,6 +201,15 @@ TEST_F (Reader, AFrameWithoutALineIsToldFromOneThatIsEarly)
   EXPECT_EQ (take (2 * kPeriod), -1);
 }
 
+TEST_F (Reader, AFrameWithoutALineIsNumberedByTheOneAfterIt)
+{
+  add (7, 7 * kPeriod);
+  EXPECT_EQ (reader.number_at (4 * kPeriod), 4u);
+  EXPECT_EQ (reader.number_at (7 * kPeriod - 1), 6u);
+  EXPECT_EQ (reader.number_at (-2 * kPeriod), 0u);
+  EXPECT_FALSE (reader.number_at (7 * kPeriod));
+}
+
 TEST_F (Reader, LinesWithoutAFrameAreCounted)
 {
   for (int i = 0; i < 6; i++)

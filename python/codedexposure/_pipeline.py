@@ -212,6 +212,7 @@ class Player:
         self.quiet = quiet
         self.part = part
         self.was_cut = False  # the stream ended before its last line
+        self._error: Error | None = None  # that is raised behind a sample
         try:
             self.pipeline = Gst.parse_launch(description)
         except GLib.Error as error:
@@ -268,8 +269,8 @@ class Player:
 
     def _heed(self, message) -> None:
         if message.type == Gst.MessageType.ERROR:
-            raise _error_of(message)
-        if message.type == Gst.MessageType.WARNING:
+            self._error = _error_of(message)
+        elif message.type == Gst.MessageType.WARNING:
             error, debug = message.parse_warning()
             self.warn(_text_of(message, error, debug))
         elif message.type == Gst.MessageType.ELEMENT:
@@ -280,10 +281,10 @@ class Player:
                 self.warn(text)
 
     def heed_messages(self) -> None:
-        """Raises and warns of what the elements have posted."""
+        """Warns of what the elements have posted, and keeps an error."""
         kinds = (Gst.MessageType.ERROR | Gst.MessageType.WARNING
                  | Gst.MessageType.ELEMENT)
-        while message := self.bus.pop_filtered(kinds):
+        while message := not self._error and self.bus.pop_filtered(kinds):
             self._heed(message)
 
     def _on_event(self, _, info):
@@ -309,11 +310,15 @@ class Player:
         # An element that fails may never end the stream, so the wait for a
         # sample is limited and messages are read in between.
         wait = 50 * Gst.MSECOND
-        while True:
-            self.heed_messages()
+        while not self._error:
+            ended = self.out.get_property("eos")
             sample = self.out.emit("try-pull-sample", wait)
+            # What is said of a sample is posted before it comes, and nothing
+            # reads on if it was the only one that was asked for.
+            self.heed_messages()
             if sample:
                 yield sample
-            elif self.out.get_property("eos"):
-                self.heed_messages()
-                return
+            elif ended:
+                break
+        if self._error:
+            raise self._error

@@ -123,6 +123,12 @@ def shows_pattern(sample) -> bool:
     return bool(fields and fields.has_field("pattern"))
 
 
+def number_of(sample) -> int | None:
+    """Frame.frame."""
+    fields = _fields_of(sample.get_buffer())
+    return fields.get_value("frame") if fields else None
+
+
 def frame_of(sample) -> Frame:
     """The frame in a GstSample."""
     buffer = sample.get_buffer()

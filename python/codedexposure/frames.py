@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bisect
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import islice
 from typing import TYPE_CHECKING
 
@@ -43,27 +44,32 @@ class Frames(Sequence):
     def __repr__(self):
         return f"<Frames of {self._recording.path}>"
 
-    def _times(self) -> list[int]:
-        """Of the coded frames that give pictures."""
+    def _places(self) -> list[tuple[int, int | None]]:
+        """Times and numbers of the coded frames that give pictures."""
         if not self._countable:
             raise UncountableError(
                 f"frames of {self._recording.path} and a second camera have no "
                 "numbers; read them in a loop")
-        return self._recording.coded_times(decoded=bool(self._decoder))
+        return self._recording.coded_places(decoded=bool(self._decoder))
 
     def _count(self) -> int:
         """Pictures of a coded frame: those of the first one."""
         if self._per_frame is None:
-            times = self._times()
             self._per_frame = 1 if not self._decoder else sum(
                 1 for _ in self._recording.play_part(
-                    self._decoder, times[0],
-                    times[1] if len(times) > 1 else None))
+                    self._decoder, *self._times(0, 0), quiet=True))
         return self._per_frame
 
+    def _times(self, first: int, last: int) -> tuple[int, int | None]:
+        """At which the first of these coded frames begins, and the one behind
+        the last."""
+        places = self._places()
+        return (places[first][0],
+                places[last + 1][0] if last + 1 < len(places) else None)
+
     def _whole(self) -> range:
-        times = self._times()
-        return range(self._count() * len(times) if times else 0)
+        places = self._places()
+        return range(self._count() * len(places) if places else 0)
 
     def _range(self) -> range:
         return self._whole() if self._part is None else self._part
@@ -82,7 +88,7 @@ class Frames(Sequence):
         if self._part is not None and self._part != self._whole():
             raise ValueError("these frames are a part already; take one of the "
                              "whole recording")
-        times = self._times()
+        times = [time for time, _ in self._places()]
         first, last = (bisect.bisect_left(times, round(time * 1e9))
                        if time is not None else len(times)
                        for time in (start, stop))
@@ -117,14 +123,19 @@ class Frames(Sequence):
         """The frames of a range that counts upwards."""
         if not part:
             return
-        times, count = self._times(), self._count()
+        places, count = self._places(), self._count()
         first, last = part[0] // count, part[-1] // count
-        pictures = self._recording.play_part(
-            self._decoder, times[first],
-            times[last + 1] if last + 1 < len(times) else None)
+        pictures = self._recording.play_part(self._decoder,
+                                             *self._times(first, last))
         skipped, given = part[0] - first * count, 0
-        for frame in islice(pictures, skipped, skipped + part[-1] - part[0] + 1,
-                            part.step):
+        for place, frame in zip(part, islice(
+                pictures, skipped, skipped + part[-1] - part[0] + 1, part.step)):
+            number = places[place // count][1]
+            if frame.corrupted or number is None:
+                # Without a line, it was counted from where the part begins.
+                frame = replace(frame, frame=number)
+            if frame.frame != number:
+                break
             given += 1
             yield frame
         if given < len(part):

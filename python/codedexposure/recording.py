@@ -13,11 +13,12 @@ from fractions import Fraction
 
 from ._pipeline import (ContainerError, Error, Player, UncountableError,
                         element, quoted)
-from .frame import Frame, frame_of, position_of, shows_pattern
+from .frame import Frame, frame_of, number_of, position_of, shows_pattern
 from .frames import Frames
 
 _NOT_OF_SCHEDULE = ("mapping", "size", "rate", "bits", "track", "simulated",
                     "bench", "partner", "beam")
+_CUT = "the recording is cut off; what could be decoded was"
 
 
 def open(path: str | os.PathLike) -> Recording:  # pylint: disable=W0622
@@ -45,7 +46,7 @@ class Recording:
 
     def __init__(self, path: str | os.PathLike):
         self.path = os.fspath(path)
-        self._times: list[tuple[int, bool]] | None = None
+        self._places: list[tuple[int, int | None, bool]] | None = None
         self._is_uniform = True
         self._check()
         first, setup = self._look()
@@ -223,7 +224,7 @@ class Recording:
         if last is None:
             raise self._no_frame()
         if self._cut:
-            player.warn("the recording is cut off; what could be decoded was")
+            player.warn(_CUT)
 
     def _goes_on(self, last: int | None, decoded: bool) -> bool:
         """Of one whose end was not reached: whether frames follow the last one
@@ -239,36 +240,41 @@ class Recording:
         for _, frame in self._play(decoder):
             yield frame
 
-    def play_part(self, decoder: str, start: int,
-                  stop: int | None) -> Iterator[Frame]:
+    def play_part(self, decoder: str, start: int, stop: int | None,
+                  quiet: bool = False) -> Iterator[Frame]:
         """The same of the coded frames at times of [start, stop), ns."""
-        with Player(self._description(decoder, False), self.path,
+        with Player(self._description(decoder, False), self.path, quiet,
                     part=(start, stop)) as player:
+            if self._cut and stop is None:
+                player.warn(_CUT)
             for sample in player:
                 # A coded frame before may last until the start.
                 if position_of(sample) >= start:
                     yield frame_of(sample)
 
-    def coded_times(self, decoded: bool) -> list[int]:
-        """The times of all coded frames, or of those that are decoded, ns."""
-        if self._times is None:
-            self._times = self._read_times()
+    def coded_places(self, decoded: bool) -> list[tuple[int, int | None]]:
+        """The times, ns, and the numbers of all coded frames, or of those that
+        are decoded."""
+        if self._places is None:
+            self._places = self._read_places()
         if decoded and not self._is_uniform:
             raise UncountableError(
                 f"the schedule changes within {self.path}, so its pictures "
                 "have no numbers; read them in a loop")
-        return [time for time, pattern in self._times
+        return [(time, number) for time, number, pattern in self._places
                 if not (decoded and pattern)]
 
-    def _read_times(self) -> list[tuple[int, bool]]:
+    def _read_places(self) -> list[tuple[int, int | None, bool]]:
         try:
             with Player(self._description("", False, decode=False), self.path,
                         quiet=True) as player:
-                times = [(position_of(sample), shows_pattern(sample))
-                         for sample in player]
+                places = [(position_of(sample), number_of(sample),
+                           shows_pattern(sample)) for sample in player]
                 if player.was_cut and self._goes_on(
-                        max(times)[0] if times else None, False):
+                        max(time for time, *_ in places) if places else None,
+                        False):
                     raise ContainerError("its end was not reached")
+                self._cut |= player.was_cut
         except ContainerError as damage:
             raise UncountableError(
                 f"{self.path}: the index or the tags are damaged ({damage}), so "
@@ -276,7 +282,7 @@ class Recording:
         schedules = {json.dumps(_schedule_of(setup))
                      for setup in player.setups()}
         self._is_uniform = len(schedules) <= 1
-        return times
+        return places
 
     def _look(self) -> tuple[Frame, dict | None]:
         """The first frame, and the setup in the stream tag. What is wrong is

@@ -30,6 +30,13 @@ def setUpModule():
     data = bytearray((SCRATCH / "plain.mkv").read_bytes())
     data[data.index(b"\xbb\x01", data.rindex(b"\x1c\x53\xbb\x6b") + 20) + 8] ^= 4
     (SCRATCH / "damaged.mkv").write_bytes(data)
+    data = bytearray(whole)
+    for number in (5, 30, 40, 41, 42, 43, 44, 45, 59):
+        data[data.index(b'{"frame":%d,' % number) + 1] ^= 1
+    (SCRATCH / "gaps.mkv").write_bytes(data)
+    play("videotestsrc num-buffers=12 ! video/x-raw,format=GRAY8,width=96,"
+         "height=64,framerate=25/1 ! avenc_ffv1 ! matroskamux ! "
+         "filesink location=trackless.mkv")
     run("record", "--fast", "--frames", "16", "--size", "96x64", "--codec",
         "raw", "--schedule", "sequential:lattice:8/3", "--output", "raw.mkv")
 
@@ -93,6 +100,39 @@ class Sequence(unittest.TestCase):
 
     def test_that_was_cut_off(self):
         self.check_all("cut.mkv")
+
+    def test_the_last_frame_of_one_that_was_cut_off_warns(self):
+        for frames in opened("cut.mkv").coded(), opened("cut.mkv").subframes():
+            for read in (lambda f: f[-1], lambda f: list(f[-3:]),
+                         lambda f: list(f.between(0.5))):
+                with self.assertWarnsRegex(codedexposure.RecordingWarning,
+                                           "the recording is cut off"):
+                    read(frames)
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                frames[2]  # pylint: disable=pointless-statement
+
+    def test_without_lines_of_the_track(self):
+        self.check_all("gaps.mkv")
+        frames = opened("gaps.mkv").coded()
+        self.assertEqual(len(frames), 40)
+        for index, number in ((5, 5), (10, 30), (20, 40), (25, 45), (39, 59)):
+            with self.assertWarnsRegex(codedexposure.RecordingWarning,
+                                       "the track has no line for it") as said:
+                frame = frames[index]
+            self.assertEqual(frame.frame, number)
+            self.assertTrue(frame.corrupted)
+            self.assertNotIn("frame 0", str(said.warnings[0].message))
+
+    def test_without_a_track_no_part_says_numbers(self):
+        """They are counted from the first frame by time."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", codedexposure.RecordingWarning)
+            recording = opened("trackless.mkv")
+            frames = recording.subframes(schedule="sequential:2x2")
+            self.assertEqual([frame.frame for frame in frames][::4], [*range(12)])
+            self.assertIsNone(frames[20].frame)
+            self.assertIsNone(recording.coded()[5].frame)
 
     def test_raw(self):
         self.check_all("raw.mkv")

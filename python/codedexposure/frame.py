@@ -14,6 +14,14 @@ _NO_TIME = 2**64 - 1
 _TYPES = {"GRAY8": np.dtype("u1"), "GRAY16_LE": np.dtype("<u2")}
 
 
+def as_array(image: np.ndarray, dtype, copy) -> np.ndarray:
+    """What __array__ () returns; numpy before 2.0 does not know copy=None."""
+    if copy is False and dtype not in (None, image.dtype):
+        raise ValueError(f"pixels of {image.dtype} cannot be {np.dtype(dtype)} "
+                         "without a copy; leave out copy=False")
+    return image.astype(dtype or image.dtype, copy=bool(copy))
+
+
 @dataclass(frozen=True)
 class Frame:
     """A subframe, a full-size frame or a coded frame. Unknown values are None.
@@ -54,6 +62,10 @@ class Frame:
     def time(self) -> float:
         """time_ns in seconds."""
         return self.time_ns * 1e-9
+
+    def __array__(self, dtype=None, copy=None) -> np.ndarray:
+        """image, for numpy."""
+        return as_array(self.image, dtype, copy)
 
 
 class _MapInfo(ctypes.Structure):  # pylint: disable=too-few-public-methods

@@ -8,8 +8,10 @@ from dataclasses import replace
 from itertools import islice
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ._pipeline import Error, UncountableError
-from .frame import Frame
+from .frame import Frame, as_array
 
 if TYPE_CHECKING:
     from .recording import Recording
@@ -115,6 +117,17 @@ class Frames(Sequence):
         if self._part.step < 0:
             return iter(list(self._read(self._part[::-1]))[::-1])
         return self._read(self._part)
+
+    def __array__(self, dtype=None, copy=None) -> np.ndarray:
+        """The images of all, shape (frames, height, width), for numpy."""
+        if copy is False:
+            raise ValueError("images of frames are an array only as a copy; "
+                             "leave out copy=False")
+        images = [frame.image for frame in self]
+        if not images:
+            raise ValueError("there is no frame here, whose size and type an "
+                             "array could have")
+        return as_array(np.stack(images), dtype, None)
 
     def __reversed__(self):
         return iter(self[::-1])

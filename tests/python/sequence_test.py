@@ -251,6 +251,34 @@ class Whole(unittest.TestCase):
         self.assertGreater(got.max(), 0)
 
 
+class Arrays(unittest.TestCase):
+    def test_a_frame(self):
+        frame = opened("plain.mkv").coded()[3]
+        self.assertIs(np.asarray(frame), frame.image)
+        self.assertEqual(np.asarray(frame, np.float32).dtype, np.float32)
+        copy = np.array(frame)
+        self.assertTrue(copy.flags.writeable)
+        self.assertTrue(np.array_equal(copy, frame.image))
+        self.assertEqual(np.mean(frame), frame.image.mean())
+        self.assertIs(frame.__array__(copy=False), frame.image)
+        self.assertIsNot(frame.__array__(copy=True), frame.image)
+        with self.assertRaisesRegex(ValueError, "leave out copy=False"):
+            frame.__array__(np.float32, copy=False)
+
+    def test_frames(self):
+        frames = opened("plain.mkv").subframes()
+        images = np.stack([frame.image for frame in frames])
+        for array in np.asarray(frames), np.stack(list(frames)):
+            self.assertEqual(array.dtype, np.uint8)
+            self.assertTrue(np.array_equal(array, images))
+        self.assertTrue(np.array_equal(np.asarray(frames[8:3:-2], float),
+                                       images[8:3:-2]))
+        with self.assertRaisesRegex(ValueError, "no frame here"):
+            np.asarray(frames[5:5])
+        with self.assertRaisesRegex(ValueError, "leave out copy=False"):
+            frames.__array__(copy=False)
+
+
 class TwoCameras(unittest.TestCase):
     def test_pictures_are_those_of_decode(self):
         for name, beam in ("first", "on"), ("second", "off"):
@@ -283,7 +311,8 @@ class TwoCameras(unittest.TestCase):
         for frame, on, off in zip(frames, opened("on.mkv").coded(),
                                   opened("off.mkv").coded()):
             self.assertTrue(np.array_equal(frame.image, on.image))
-            self.assertTrue(np.array_equal(frame.complement.image, off.image))
+            self.assertTrue(np.array_equal(frame.complement, off.image))
+            self.assertTrue(np.array_equal(frame, on.image))
             self.assertEqual(frame.complement.time_ns, frame.time_ns)
         self.assertTrue(np.array_equal(pairs.coded()[7].complement.image,
                                        frames[7].complement.image))

@@ -78,6 +78,10 @@ public:
     const std::string recording = fs::canonical (recording_, ignored);
     const std::string output = output_.value_or (recording);
     check_names (recording, output);
+    if (info.head.codec == MatroskaHead::Codec::none)
+      fail (recording +
+            " cannot be read: the head of the file, which lists its tracks, is "
+            "damaged or cut off; use another copy of the recording");
     if (info.head.codec != MatroskaHead::Codec::raw) {
       if (output_)
         fail (recording + " is FFV1 already; copy it");

@@ -122,6 +122,7 @@ read_track (Source &file, const Element &entry, MatroskaHead &head)
 std::optional<MatroskaHead>
 head_of (Source &file, const Element &segment)
 {
+  constexpr std::size_t kLongest = std::size_t (1) << 16;
   MatroskaHead head;
   head.end = segment.is_open ? 0 : segment.end;
   bool complete = false;
@@ -141,8 +142,12 @@ head_of (Source &file, const Element &segment)
     file.each (part, [&] (const Element &entry) {
       if (entry.id == kTrackEntry)
         read_track (file, entry, head);
+      head.has_no_video |= entry.id == kTrackEntry;
       return true;
     });
+    head.has_no_video &=
+        head.codec == MatroskaHead::Codec::none &&
+        file.text (part, kLongest).find ("V_") == std::string_view::npos;
     return false;
   });
   return complete ? std::optional (head) : std::nullopt;
@@ -349,6 +354,10 @@ recording_info (const std::string &path, bool with_frames)
                                                 : segment->end > file.size ());
   if (info.head.tick == 0)
     return Error{path + ": " + MatroskaHead::kNoTick, ErrorCode::parse};
+  if (info.head.has_no_video)
+    return Error{
+        path + " has no video, but a recording has coded frames" + kRemedy,
+        ErrorCode::parse};
   if (info.head.codec == MatroskaHead::Codec::other)
     return Error{path + " has " + info.head.codec_name +
                      ", but coded frames are recorded as FFV1 or raw" + kRemedy,

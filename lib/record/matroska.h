@@ -20,7 +20,10 @@ struct MatroskaHead {
   enum class Codec { none, ffv1, raw, other };
 
   Codec codec = Codec::none; ///< of the first video track
-  std::string codec_name;    ///< as the file has it
+  /** It lists tracks, and none of them was ever a video: damage to a name or a
+   * type leaves the other. */
+  bool has_no_video = false;
+  std::string codec_name; ///< as the file has it
   /** Of the video; 0x0: there is none, or the head is damaged. */
   Extent size = {0, 0};
   /** Bytes of a pixel of raw frames: 1 or 2; 0: their format is not grey. */

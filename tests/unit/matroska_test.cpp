@@ -129,8 +129,8 @@ TEST (Matroska, TheHeadOfAFileWithoutTicksIsDamaged)
   bytes.replace (scale + 4, 2, "\0\0"s);
   const auto info = read (bytes);
   ASSERT_FALSE (info);
-  EXPECT_NE (info.error ().message.find ("its TimestampScale is 0"),
-      std::string::npos)
+  EXPECT_NE (
+      info.error ().message.find ("its TimestampScale is 0"), std::string::npos)
       << info.error ().message;
 }
 
@@ -180,6 +180,12 @@ TEST (Matroska, WhatIsNoRecordingIsRefusedByItsName)
   other.replace (other.find ("V_UNCOMPRESSED"), 14, "V_MPEG4/ISO/AV");
   EXPECT_NE (
       read (other).error ().message.find ("V_MPEG4/ISO/AV"), std::string::npos);
+  other.replace (other.find ("V_MPEG4/ISO/AV"), 2, "A_");
+  const std::string video_type = short_element ("\x83", {kVideo});
+  const std::size_t type = other.find (video_type);
+  other.replace (type, video_type.size (), short_element ("\x83", {2}));
+  EXPECT_NE (
+      read (other).error ().message.find ("has no video"), std::string::npos);
   const auto missing = recording_info ("/nowhere/at/all.mkv");
   EXPECT_EQ (missing.error ().code, ErrorCode::io);
 }

@@ -242,8 +242,7 @@ Outputs::check (GstElement *pipeline) const
   inputs.insert (inputs.end (), inputs_.begin (), inputs_.end ());
   std::set<fs::path> places;
   for (const auto &output : outputs_) {
-    for (const std::string &written :
-        {output->name (), output->name () + ".part"})
+    for (const std::string &written : {output->name (), output->unfinished ()})
       if (auto checked = check_is_no_input (written, inputs); !checked)
         return checked;
     if (!output->kind.recording)
@@ -255,16 +254,16 @@ Outputs::check (GstElement *pipeline) const
             written + " is written twice; give each output its own name"};
   }
   for (const auto &output : outputs_)
-    if (const std::string part = output->name () + ".part";
-        places.contains (place_of (part)))
-      return Error{part + " is where " + output->name () +
-                   " is written until it is complete; use another name"};
-  for (const auto &output : outputs_)
-    for (const fs::path &place : places)
+    for (const fs::path &place : places) {
+      const fs::path unfinished = place_of (output->unfinished ());
+      if (place == unfinished || lies_in (place, unfinished))
+        return Error{output->unfinished () + " is where " + output->name () +
+                     " is written until it is complete; use another name"};
       if (output->kind.folder_with &&
           lies_in (place, place_of (output->name ())))
         return Error{place.string () + " lies in " + output->name () +
                      ", which is one output; name a file beside it"};
+    }
   return {};
 }
 

@@ -63,6 +63,8 @@ public:
   /** Where it is written until it is published. */
   const std::string &part () const { return part_->path (); }
   guint64 frames () const { return frames_; }
+  /** The name of part (), also before claim (). */
+  virtual std::string unfinished () const { return name_ + ".part"; }
   /** A file that it also writes; empty: none. */
   virtual std::string table () const { return {}; }
   /** What a shell has to do before the element can write the name itself. */

@@ -128,6 +128,17 @@ PictureNames::path (const std::string &file) const
 Pictures::Pictures (GstElement *sink, GstPad *coded, const std::string &format)
     : Output (format, {}), sink_ (sink), coded_ (coded), format_ (format)
 {
+  if (auto names = PictureNames::parse (format))
+    names_ = *std::move (names);
+}
+
+std::string
+Pictures::unfinished () const
+{
+  return (fills_named_folder () ? names_.folder
+                                : names_.path (names_.prefix + names_.number +
+                                               names_.suffix)) +
+         ".part";
 }
 
 Result<void>
@@ -150,10 +161,8 @@ Pictures::check_unused () const
 Result<void>
 Pictures::check_name (bool replace)
 {
-  auto names = PictureNames::parse (format_);
-  if (!names)
+  if (const auto names = PictureNames::parse (format_); !names)
     return names.error ();
-  names_ = std::move (*names);
   name_ = fills_named_folder ()
               ? names_.folder + "/"
               : names_.path (names_.prefix + names_.number + names_.suffix);
@@ -276,8 +285,7 @@ Pictures::name_element ()
 std::string
 Pictures::table () const
 {
-  const auto names = PictureNames::parse (format_);
-  return names ? names->path (names->table ()) : "";
+  return PictureNames::parse (format_) ? names_.path (names_.table ()) : "";
 }
 
 std::string

@@ -45,6 +45,7 @@ public:
   Result<void> claim (bool replace) override;
   void name_element () override;
   std::string table () const override;
+  std::string unfinished () const override;
   std::string preparation () const override;
   Result<void> publish () override;
   bool has_content () const override;

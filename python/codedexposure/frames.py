@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bisect
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import islice
@@ -84,7 +85,8 @@ class Frames(Sequence):
         Raises ValueError unless 0 <= start <= stop, and where these frames are
         only a part already.
         """
-        if start < 0 or (stop is not None and stop < start):
+        stop = math.inf if stop is None else stop
+        if not 0 <= start <= stop or start == math.inf:
             raise ValueError(f"a part is from 0 or later to its start or later, "
                              f"not from {start} to {stop}")
         if self._part is not None and self._part != self._whole():
@@ -92,7 +94,7 @@ class Frames(Sequence):
                              "whole recording")
         times = [time for time, _ in self._places()]
         first, last = (bisect.bisect_left(times, round(time * 1e9))
-                       if time is not None else len(times)
+                       if time < math.inf else len(times)
                        for time in (start, stop))
         return self[first * self._count():last * self._count()]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import builtins
 import json
+import operator
 import os
 import re
 import stat
@@ -84,7 +85,9 @@ class Recording:
         bits      significant bits of the pixels, instead of those of the
                   recording
         """
-        pad = "src" if region is None else f"region_{int(region)}"
+        if region is not None and operator.index(region) < 0:
+            raise ValueError(f"region is 0 or more, not {region}")
+        pad = "src" if region is None else f"region_{operator.index(region)}"
         return Frames(
             self, "queue max-size-buffers=8 ! "
             + element("codedexposure-demux", name="demux",

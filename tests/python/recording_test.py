@@ -343,6 +343,13 @@ class Faults(unittest.TestCase):
             warnings.simplefilter("ignore")
             list(opened("fast.mkv").subframes())
 
+    def test_wrong_regions(self):
+        recording = opened("plain.mkv")
+        with self.assertRaisesRegex(ValueError, "region is 0 or more, not -1"):
+            recording.subframes(region=-1)
+        with self.assertRaisesRegex(TypeError, "float"):
+            recording.subframes(region=1.5)
+
     def test_wrong_values(self):
         recording = opened("plain.mkv")
         for text, options in {

@@ -231,8 +231,11 @@ class Whole(unittest.TestCase):
                 wanted = [frame for frame in whole if frame.frame in chosen]
                 self.assertEqual(len(wanted), len(part))
                 self.assertTrue(all(map(same, part, wanted)))
-        with self.assertRaisesRegex(ValueError, "not from -1 to None"):
-            frames.between(-1)
+        self.assertEqual(len(frames.between(0.5, float("inf"))),
+                         len(frames.between(0.5)))
+        for start, stop in ((-1, None), ("nan", None), (0, "nan"), ("inf", None)):
+            with self.assertRaisesRegex(ValueError, f"not from {float(start)} to"):
+                frames.between(float(start), stop and float(stop))
         with self.assertRaisesRegex(ValueError, "not from 2 to 1"):
             frames.between(2, 1)
         with self.assertRaisesRegex(ValueError, "a part already"):

@@ -75,7 +75,12 @@ Run::publish ()
 std::string
 Run::flaws () const
 {
-  std::string text = flaws_of (pipeline (), job_.recorders, job_.hurried);
+  /* What writes pictures takes coded frames without pictures for lost ones. */
+  auto counting = job_.recorders;
+  if (counting.empty () && job_.counted &&
+      counter_of (job_.counted, "frames-not-coded") > 0)
+    counting = {job_.counted};
+  std::string text = flaws_of (pipeline (), counting, job_.hurried);
   for (const auto &queue : leaky_queues_)
     for (GstElement *element : job_.hurried)
       if (queue->is_before (element) && queue->skipped () > 0)

@@ -26,6 +26,18 @@ ends_with_stream (GstPad *sinkpad, GstClockTime stop)
          GstClockTime (duration) <= stop + kRounding;
 }
 
+/* A seek leaves out frames that nobody counts. */
+void
+count_from_seek (FrameSequence &sequence, const GstSegment &upstream,
+    GstBuffer *frame, GstClockTime period)
+{
+  guint64 position = 0;
+  if (upstream.rate > 0 && !get_frame_meta (frame) &&
+      gst_segment_to_stream_time_full (
+          &upstream, GST_FORMAT_TIME, GST_BUFFER_PTS (frame), &position) > 0)
+    sequence.go_to ((position + period / 2) / period);
+}
+
 } // namespace
 
 /* The first frames of a camera come less than a period apart, until its clock
@@ -60,6 +72,9 @@ CodedFilter::chain (BufferPtr frame)
     return drain ();
   if (flow == GST_FLOW_OK)
     flow = negotiate (frame.get ());
+  if (flow == GST_FLOW_OK && stream_.excerpt)
+    count_from_seek (
+        *stream_.sequence, stream_.upstream, frame.get (), format ().period ());
   if (flow == GST_FLOW_OK)
     frame = restore_clipped_frame (std::move (frame));
   if (flow != GST_FLOW_OK || !frame)

@@ -51,6 +51,12 @@ public:
 
   /** Number of the frame that comes next, if none is lost. */
   std::uint64_t next_number () const { return next_number_; }
+  /** After resync (), unless a frame has come: that frame has @p number. */
+  void go_to (std::uint64_t number)
+  {
+    if (!last_)
+      next_number_ = number;
+  }
 
   /** @p time of the frame, any epoch; times fall when @p reverse. */
   FrameStep take (Nanoseconds time, bool reverse = false);

@@ -94,7 +94,8 @@ struct Job {
   bool salvage = false;
   /** The queues before encoder and disk of live recordings. */
   std::vector<GstElement *> buffers;
-  /** Write live recordings, and count the frames that are missing in them. */
+  /** Write recordings of a source, and count the frames that are missing in
+   * them. */
   std::vector<GstElement *> recorders;
   /** If the recording behind the only buffer fails, the rest goes on. */
   bool buffer_may_fail = false;

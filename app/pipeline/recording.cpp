@@ -36,10 +36,10 @@ write_recording (Job &job, Chain &chain, const std::string &file,
   chain.to ("codedexposure-recordmux",
       {{"codec", style.codec}, {"threads", style.threads}});
   GstElement *mux = chain.last ();
-  if (style.live) {
+  if (style.live)
     job.buffers.push_back (queue);
+  if (!job.reader)
     job.recorders.push_back (mux);
-  }
   const ObjectPtr<GstPad> frames = pad_of (mux, "sink");
   if (style.codec == "raw")
     chain.to ("codedexposure-filesink", {{"reserve", style.bytes}});

@@ -74,6 +74,9 @@ struct Job {
   GstElement *bench = nullptr;
   /** Coded frames are counted where they enter this element. */
   GstElement *counted = nullptr;
+  /** Where the frames of a new recording come in: positions in messages count
+   * from the first; null: they are those of what is read. */
+  GstElement *recorded = nullptr;
   /** Of the coded frames; none: not known. */
   std::optional<gint64> total;
   PlayTimes times;

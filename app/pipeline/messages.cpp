@@ -400,14 +400,15 @@ in_seconds (GstClockTime time)
 
 /* As --excerpt and the tables of pictures count. */
 std::string
-position_of (GstMessage *posted, GstClockTime time)
+position_of (GstMessage *posted, GstClockTime time, GstClockTime origin)
 {
   GstObject *source = GST_MESSAGE_SRC (posted);
   const ObjectPtr<GstPad> pad (
       GST_IS_ELEMENT (source)
           ? gst_element_get_static_pad (GST_ELEMENT (source), "src")
           : nullptr);
-  return in_seconds (pad ? stream_time (pad.get (), time) : time);
+  const GstClockTime position = pad ? stream_time (pad.get (), time) : time;
+  return in_seconds (position - std::min (position, origin));
 }
 
 std::string
@@ -421,14 +422,17 @@ slip_text (int slots)
 } // namespace
 
 std::string
-notice (GstMessage *posted)
+notice (GstMessage *posted, GstClockTime origin)
 {
   const GstStructure *message = gst_message_get_structure (posted);
   const std::string of =
       is_of_second_camera (posted) ? " of the second camera" : "";
+  const auto place_of = [&] (GstClockTime time) {
+    return position_of (posted, time, origin);
+  };
   if (const auto lost = from_structure<FramesLost> (message))
     return "warning: coded frames" + of + " were lost before " +
-           position_of (posted, lost->to) + ": " + number (lost->count);
+           place_of (lost->to) + ": " + number (lost->count);
   if (const auto incomplete = from_structure<FrameIncomplete> (message))
     return "warning: frame " + number (incomplete->frame) + of +
            " arrived incomplete; check the connection of the camera";
@@ -440,7 +444,7 @@ notice (GstMessage *posted)
            " on, the mirrors are " + slip_text (slip->slots) +
            "; these frames are flagged";
   if (const auto damaged = from_structure<FramesDamaged> (message)) {
-    const std::string at = position_of (posted, damaged->from);
+    const std::string at = place_of (damaged->from);
     const std::string frame =
         damaged->frame ? "frame " + number (*damaged->frame) : at;
     return damaged->active
@@ -451,12 +455,12 @@ notice (GstMessage *posted)
                      " on: " + number (damaged->count.value_or (0));
   }
   if (const auto lost = from_structure<PartnerLost> (message))
-    return lost->active ? "warning: from " + position_of (posted, lost->from) +
+    return lost->active ? "warning: from " + place_of (lost->from) +
                               " on, coded frames have no partner of the second "
                               "camera: " +
                               quoted (lost->reason)
                         : "warning: coded frames without a partner from " +
-                              position_of (posted, lost->from) +
+                              place_of (lost->from) +
                               " on: " + number (lost->frames.value_or (0));
   if (const auto drifted = from_structure<PartnerDrifted> (message))
     return drifted->active
@@ -470,7 +474,7 @@ notice (GstMessage *posted)
                  "them "
                  "again";
   if (const auto missing = from_structure<FramesMissing> (message))
-    return "warning: from " + position_of (posted, missing->from) +
+    return "warning: from " + place_of (missing->from) +
            " on, recorded frames" + of +
            " are missing: " + number (missing->count);
   if (from_structure<StreamCut> (message))

@@ -64,8 +64,9 @@ std::string remedy_for (
 std::string fields_of (GstMessage *message);
 
 /** An element message about frames that were lost or damaged, as a warning for
- * the user; empty: it is about something else. */
-std::string notice (GstMessage *posted);
+ * the user; empty: it is about something else.
+ * @p origin  position from which the user counts, ns. */
+std::string notice (GstMessage *posted, GstClockTime origin);
 
 /** A value of the statistics of @p element; 0: it has none of that name. */
 guint64 counter_of (GstElement *element, const char *counter);

@@ -33,6 +33,8 @@ write_recording (Job &job, Chain &chain, const std::string &file,
           {"max-size-buffers", frames_that_wait (style.rate)},
           {"max-size-bytes", room_in_memory ()}, {"max-size-time", 0}});
   GstElement *queue = chain.last ();
+  if (!job.recorded)
+    job.recorded = queue;
   chain.to ("codedexposure-recordmux",
       {{"codec", style.codec}, {"threads", style.threads}});
   GstElement *mux = chain.last ();

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/messages.h"
+#include "pipeline/pads.h"
 #include "record/matroska.h"
 
 namespace codedexposure::app
@@ -89,6 +90,13 @@ Run::prepare ()
   if (job_.counted)
     counter_ = std::make_unique<FrameCounter> (pad_of (job_.counted, "sink"),
         job_.times, [this] { end (Exit::nobody); });
+  if (job_.recorded)
+    add_probe (pad_of (job_.recorded, "sink").get (), GST_PAD_PROBE_TYPE_BUFFER,
+        [this] (GstPad *pad, GstPadProbeInfo *info) {
+          origin_ = stream_time (
+              pad, GST_BUFFER_PTS (GST_PAD_PROBE_INFO_BUFFER (info)));
+          return GST_PAD_PROBE_REMOVE;
+        });
   each_element (pipeline (), [this] (GstElement *element) {
     gint leaky = 0;
     if (g_object_class_find_property (G_OBJECT_GET_CLASS (element), "leaky"))
@@ -387,7 +395,7 @@ Run::on_element_message (const GstStructure *structure, GstMessage *message)
       std::ranges::count (
           job_.hurried, GST_ELEMENT (GST_MESSAGE_SRC (message))))
     return;
-  const std::string text = notice (message);
+  const std::string text = notice (message, origin_);
   if (!text.empty () && std::exchange (noticed_, text) != text)
     status_.line (text);
 }

@@ -2,6 +2,7 @@
 /* Plays a pipeline: for run.cpp and run_end.cpp only. */
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <memory>
 #include <string>
@@ -68,6 +69,8 @@ private:
   GMainLoop *loop_;
   Status status_;
   std::unique_ptr<FrameCounter> counter_;
+  /** Position of the first frame of a new recording, ns. */
+  std::atomic<GstClockTime> origin_ = 0;
   std::vector<std::unique_ptr<LeakyQueue>> leaky_queues_;
   std::vector<BufferWatch> buffer_watches_;
   std::unique_ptr<Receivers> receivers_;

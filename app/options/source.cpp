@@ -273,6 +273,10 @@ SecondCamera::declare (Options &options)
       "--second-camera", camera, "NAME", "that camera, beside --camera");
   options.value ("--second-bench", bench, "FILE",
       "what was measured with it [what --bench says of a second camera]");
+  options.value ("--second-size", size, "WxH",
+      "size of its frames [that of its profile; that of the first camera]",
+      picture_size ());
+  options.need ({"--second-size"}, "--second-camera");
 }
 
 void
@@ -309,6 +313,8 @@ SecondCamera::options (const SourceOptions &first) const
   options.off_beam = true;
   if (options.bench)
     options.size.reset (); // that of its camera
+  if (size)
+    options.size = size;
   return options;
 }
 

@@ -63,6 +63,7 @@ std::string rate_text (FrameRate rate);
 struct SecondCamera {
   std::optional<Text> camera; ///< none: a simulated one
   std::optional<Text> bench;  ///< what was measured with it
+  std::optional<Extent> size; ///< none: of its bench, or the first's
   /** Changes what a simulated one has of the first; null: its noise only. */
   std::function<void (SourceOptions &)> simulate = nullptr;
 

@@ -175,6 +175,7 @@ private:
   {
     Job job ("report", run_);
     job.options.json = job.has_result = false;
+    job.is_repeated = true;
     job.salvage = salvage;
     job.times = times;
     Chain frames = read_recording (job, recording_);

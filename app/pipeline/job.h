@@ -119,6 +119,8 @@ struct Job {
   bool is_moved_in = false;
   /** Shows "100 coded frames in 0:04" as they come. */
   bool has_progress = true;
+  /** A run before has read these frames, and said what is wrong with them. */
+  bool is_repeated = false;
   /** Prints "100 coded frames of ...; wrote ...". */
   bool has_result = true;
   /** Called with each element message, on the main thread. */

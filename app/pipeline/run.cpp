@@ -396,7 +396,8 @@ Run::on_element_message (const GstStructure *structure, GstMessage *message)
           job_.hurried, GST_ELEMENT (GST_MESSAGE_SRC (message))))
     return;
   const std::string text = notice (message, origin_);
-  if (!text.empty () && std::exchange (noticed_, text) != text)
+  if (!text.empty () && !job_.is_repeated &&
+      std::exchange (noticed_, text) != text)
     status_.line (text);
 }
 
@@ -416,7 +417,8 @@ Run::on_message (GstMessage *message)
       on_error (message);
     break;
   case GST_MESSAGE_WARNING:
-    status_.line ("warning: " + told (message));
+    if (!job_.is_repeated)
+      status_.line ("warning: " + told (message));
     break;
   case GST_MESSAGE_INFO:
     if (job_.options.verbose)

@@ -129,7 +129,11 @@ constexpr Word kWords[] = {
           b.mirrors.height *= 2;
         }},
     {"roi", "", "", "a part of the sensor is read"},
-    {"pixel-format", "", "", "fewer bits are sent than the sensor has"},
+    {"pixel-format", "", "", "8 bits are sent, and the sensor has more", {},
+        [] (Bench &b, const Values &) {
+          b.black_level *= 255.0 / largest_pixel (b.bits);
+          b.bits = 8;
+        }},
     {"packet-size", "", "", "packets of 576 bytes"},
     {"packet-loss", "PART", "0.02", "packets are lost on the network", {kPart},
         put<&Bench::packet_loss>},
@@ -242,9 +246,8 @@ constexpr Word kWords[] = {
         put_in<&Bench::orientation, &Orientation::flipped_y>},
     {"turned", "90|180|270", "90", "the camera is turned, degrees",
         {{90.0, 270.0, kWhole}},
-        [] (Bench &b, const Values &v) {
-          b.orientation.turned = int (v[0]) / 90 * 90;
-        }},
+        [] (Bench &b,
+            const Values &v) { b.orientation.turned = int (v[0]) / 90 * 90; }},
     /* Optics. */
     {"blur", "PIXELS", "3", "standard deviation of the blur", {{0.0, 16.0}},
         put<&Bench::blur>},
@@ -339,6 +342,11 @@ apply (Bench &bench, std::string_view piece)
   if (found->set)
     found->set (bench, *values);
   bench.parts[found->name] = std::string (text);
+  if (bench.has ("pixel-format") + bench.has ("low-bits") +
+          bench.has ("high-bits") >
+      1)
+    return Error{"the faults pixel-format, low-bits and high-bits all set the "
+                 "bits that are sent; leave only one of them"};
   return {};
 }
 

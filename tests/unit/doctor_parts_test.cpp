@@ -42,6 +42,20 @@ TEST (PartsCheck, NamesWhatIsWrong)
     expect_named (words, check_parts);
 }
 
+TEST (PartsCheck, FramesOfEightBitsAreNamedOnEveryBench)
+{
+  for (const int seed : {2, 3}) { // of 8 and of 12 bits
+    const CheckedBench e =
+        check_bench (sick_bench (seed, "pixel-format"), check_parts);
+    EXPECT_EQ (e.first_diagnosis (), "pixel-format") << seed;
+    EXPECT_EQ (e.found ().bits, 8) << seed;
+    const SickBenchOptions well = healthy_bench (seed);
+    EXPECT_NEAR (e.truth ().black_level->value / 255.0,
+        well.black_level / largest_pixel (well.bits), 1e-12)
+        << seed;
+  }
+}
+
 TEST (PartsCheck, LeavesOtherFaultsToOtherChecks)
 {
   for (const char *words : {"half-rate", "double-rate", "free-running=24.7",

@@ -398,6 +398,9 @@ TEST (SickBench, WordsAreCheckedAndAllOrNothing)
   EXPECT_NE (message ("hot-pixels=1.5"), "");
   EXPECT_NE (message ("no-trigger=1"), "");
   EXPECT_NE (message ("turned=45"), "");
+  EXPECT_EQ (message ("low-bits pixel-format"),
+      "the faults pixel-format, low-bits and high-bits all set the bits that "
+      "are sent; leave only one of them");
   EXPECT_EQ (message ("flicker leak exposure-late=1.5ms dmd-busy"), "");
   EXPECT_EQ (options.flicker_depth, 0.1);
   EXPECT_EQ (options.late, 1'500'000);

@@ -253,10 +253,11 @@ watch_pilot (GstDmdSync *self, const Frame &frame)
           std::to_string (kUnproven) +
           " frames, which are not known to be synchronised: its " +
           std::to_string (st.schedule.pilot_rows ()) +
-          " rows at the bottom of the mirrors are too dark in places, not in "
-          "the picture, or show other masks. Light them evenly, expose for "
-          "longer, or reserve more rows; let the camera see them; and let no "
-          "other program use the DMD.");
+          " rows, the last of the mirrors that show masks, are too dark in "
+          "places, not at the bottom of the picture, or show other masks. "
+          "Light them evenly, expose for longer, or reserve more rows; give "
+          "the mirrors that the camera sees as region= of the device; and let "
+          "no other program use the DMD.");
 }
 
 /** What becomes of a frame whose masks are not synchronised. */

@@ -35,7 +35,8 @@
  *
  * A process that was stopped for two seconds (Ctrl-Z, a debugger) gets the same
  * error although its camera sends frames. The camera is then restarted even if
- * #codedexposure-camerasrc:reconnect is 0.
+ * #codedexposure-camerasrc:reconnect is 0. So is one that gets no trigger
+ * because dmdsync, downstream, sends other masks to the DMD.
  *
  * ## Example pipeline
  *

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "camerasrc.h"
+#include "common/events.h"
 #include "common/messages.h"
 
 #ifdef CODEDEXPOSURE_ARAVIS
@@ -21,8 +22,19 @@ constexpr std::chrono::seconds kPause{1};
 /* aravissrc waits two seconds for a frame. A process that was stopped in that
  * time did not see whether one came. */
 constexpr std::chrono::seconds kPatience{3};
-/* Tries to restart the camera after that, whatever the property says. */
+/* Tries to restart the camera after that, and after the DMD has shown something
+ * else, whatever the property says. */
 constexpr guint kTriesAfterStop = 10;
+
+SwitchAnswer
+ask_switch (GstCodedExposureCameraSrc *self)
+{
+  const QueryPtr query (new_query<SwitchAnswer> ());
+  if (!gst_pad_peer_query (
+          pad_of (GST_ELEMENT (self), "src").get (), query.get ()))
+    return {};
+  return parse_query<SwitchAnswer> (query.get ()).value_or (SwitchAnswer ());
+}
 
 std::string
 text_of (GstMessage *message)
@@ -116,9 +128,10 @@ bring_back (GstCodedExposureCameraSrc *self, const std::stop_token &stop)
 {
   CameraState &st = state (self);
   const guint most = locked (st.lock, [&] { return st.most_tries; });
-  for (guint tries = 0; tries < most; tries++) {
+  bool first = true;
+  for (guint tries = 0; tries < most; tries += !ask_switch (self).sending) {
     std::unique_lock guard (st.lock);
-    if (tries > 0)
+    if (!std::exchange (first, false))
       st.changed.wait_for (guard, stop, kPause, [] { return false; });
     guard.unlock ();
     if (stop.stop_requested () || try_restart (self, stop))
@@ -167,6 +180,7 @@ take_failure (GstCodedExposureCameraSrc *self, GstMessage *message)
   CameraState &st = state (self);
   const bool own = is_own_failure (st, message);
   const guint reconnect = settings_of (self).reconnect;
+  const bool switching = own && ask_switch (self).switching;
   PauseWatch::Clock::duration stopped{};
   {
     const std::lock_guard guard (st.lock);
@@ -174,7 +188,7 @@ take_failure (GstCodedExposureCameraSrc *self, GstMessage *message)
       return true;
     if (st.pauses)
       stopped = st.pauses->recent (kPatience);
-    const guint tries = stopped.count () > 0
+    const guint tries = stopped.count () > 0 || switching
                             ? std::max (reconnect, kTriesAfterStop)
                             : reconnect;
     if (!st.pauses || (!st.away && !(own && st.seen && tries > 0)))
@@ -190,7 +204,11 @@ take_failure (GstCodedExposureCameraSrc *self, GstMessage *message)
     }
     st.tries = 0;
   }
-  say_lost (self, text_of (message), stopped);
+  if (switching && stopped.count () == 0)
+    post_message (
+        self, CameraLost{"the DMD triggers no frame while it gets masks"});
+  else
+    say_lost (self, text_of (message), stopped);
   std::jthread before; // it has ended, or is about to
   const std::lock_guard guard (st.lock);
   before = std::move (st.restarts);

@@ -31,6 +31,15 @@ struct MirrorsAnswer {
   CODED_FIELDS (width, height, patterns, reason);
 };
 
+/** Query, from a camera whose frames stay away: whether dmdsync has the DMD
+ * show something else, which triggers no camera meanwhile. */
+struct SwitchAnswer {
+  static constexpr const char *kName = "dmdsync/switch";
+  bool switching = false; ///< no frame has shown it yet
+  bool sending = false;   ///< the DMD still receives masks
+  CODED_FIELDS (switching, sending);
+};
+
 /** Query: whether coded frames come from codedexposure-pair, so that they have
  * partners as soon as the second camera sends frames. */
 struct PairsAnswer {

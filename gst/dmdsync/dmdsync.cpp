@@ -298,7 +298,7 @@ forget_stream (GstElement *self)
   st.stream = Stream ();
   const ObjectLock lock (self);
   st.time.reset ();
-  st.switches = 0;
+  st.switches = st.seen_switches = 0;
   st.locked.reset ();
   st.jitter = 0;
   st.latency = 0;

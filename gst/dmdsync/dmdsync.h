@@ -128,6 +128,7 @@ struct SyncState {
   GstClockTime latency = 0;     ///< our own
   std::optional<ShownPattern> pattern; ///< none: the schedule
   guint switches = 0;                  ///< between schedule and patterns
+  guint seen_switches = 0;             ///< those that frames have shown
 
   /** Keeps the runner's jobs in the order of the requests; taken before the
    * object lock, and not held while posting. */
@@ -189,6 +190,7 @@ std::shared_ptr<DmdRunner> runner_of (GstDmdSync *self);
 /** False when the pattern cannot be shown, with a warning that says why. */
 bool take_request (GstDmdSync *self, const PatternRequest &request);
 MirrorsAnswer describe_mirrors (GstDmdSync *self);
+SwitchAnswer describe_switch (GstDmdSync *self);
 /** Shows the schedule again. */
 void give_back (GstDmdSync *self, const char *reason);
 /** The pattern that a frame shows, as in its meta; empty: the schedule. */

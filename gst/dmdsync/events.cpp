@@ -366,6 +366,10 @@ query (GstBaseTransform *trans, GstPadDirection direction, GstQuery *query)
     answer_query (query, describe_mirrors (as<GstDmdSync> (trans)));
     return TRUE;
   }
+  if (direction == GST_PAD_SINK && is_query<SwitchAnswer> (query)) {
+    answer_query (query, describe_switch (as<GstDmdSync> (trans)));
+    return TRUE;
+  }
   if (!base_transform_class ()->query (trans, direction, query))
     return FALSE;
   if (GST_QUERY_TYPE (query) == GST_QUERY_LATENCY && direction == GST_PAD_SRC) {

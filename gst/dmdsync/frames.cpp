@@ -136,6 +136,10 @@ take_loss (GstDmdSync *self, const Frame &frame)
   const OnLoss on_loss = settings_of (self).on_loss;
 
   stream.discont = true;
+  if (describe_switch (self).switching) {
+    fill_gap (self, frame, from, OnLoss::gap);
+    return GST_FLOW_OK;
+  }
   count (self, &Counters::frames_lost, lost);
   GST_INFO_OBJECT (self,
       "frames lost before %" GST_TIME_FORMAT ": %" G_GUINT64_FORMAT,

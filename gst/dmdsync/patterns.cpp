@@ -149,6 +149,17 @@ describe_mirrors (GstDmdSync *self)
   return {size.width, size.height, why.empty (), why};
 }
 
+SwitchAnswer
+describe_switch (GstDmdSync *self)
+{
+  const auto runner = runner_of (self);
+  SyncState &st = state (self);
+  if (!runner || !runner->info ().triggers_camera)
+    return {};
+  return {locked (self, [&st] { return st.switches != st.seen_switches; }),
+      !runner->settled () && !runner->failed ()};
+}
+
 void
 give_back (GstDmdSync *self, const char *reason)
 {
@@ -179,6 +190,7 @@ look_for_pattern (GstDmdSync *self, GstBuffer *buffer, const FrameStep &step,
       level_of (stream.time->info, buffer), step.lost > 0);
   if (!shown)
     return kSwitch;
+  locked (self, [&st, seen = switches] { st.seen_switches = seen; });
   if (!pattern) {
     stream.coded = true;
     begin_phase (self);

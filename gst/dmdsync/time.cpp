@@ -187,8 +187,10 @@ note_end (GstDmdSync *self)
 void
 watch_rate (GstDmdSync *self, GstClockTime time)
 {
-  const Stream &stream = state (self).stream;
-  const auto rate = state (self).stream.rate_watch->take (Nanoseconds (time));
+  Stream &stream = state (self).stream;
+  if (describe_switch (self).switching)
+    stream.rate_watch->resync ();
+  const auto rate = stream.rate_watch->take (Nanoseconds (time));
   if (!rate)
     return;
   const FrameRate said = stream.time->rate;

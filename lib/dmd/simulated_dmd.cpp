@@ -294,6 +294,8 @@ parse_options (std::string_view device)
       value_key ("mask-time", "TIME", o.mask_time, parse_time),
       value_key ("serial", "TEXT", info.serial, parse_serial),
       choice_key ("still", info.still_masks, {{"yes", true}, {"no", false}}),
+      choice_key (
+          "triggers", info.triggers_camera, {{"yes", true}, {"no", false}}),
       {"slip-at", "SLOT[:BY], slots ascending",
           [&o] (std::string_view text) { return add_slip (text, o.slips); }},
       choice_key ("fail", o.failure,

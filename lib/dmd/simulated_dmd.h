@@ -166,6 +166,7 @@ private:
  *   min-switching=TIME  default 0
  *   mask-time=TIME      time to send one mask, default 0
  *   still=yes|no        whether it shows patterns on request, default yes
+ *   triggers=yes|no     whether it triggers the camera, default no
  *   slip-at=SLOT[:BY]   slips by BY slots (default 1: late) in slot SLOT of the
  *                       bench; may be given again, for a later slot
  *   fail=open|upload|start|restart  what fails

@@ -5,6 +5,7 @@
 #include <array>
 
 #include "calibrate/gratings.h"
+#include "common/events.h"
 #include "dmd/simulated_dmd.h"
 #include "sync_bench.h"
 
@@ -278,4 +279,43 @@ TEST (DmdSyncPattern, TellsTheSizeOfTheArray)
   EXPECT_EQ (width, 640);
   EXPECT_EQ (height, 480);
   EXPECT_TRUE (patterns);
+}
+
+/* The DMD triggers no camera while it gets the mask. */
+TEST (DmdSyncPattern, FramesThatASwitchTakesAreNotLost)
+{
+  SyncHarness h ("device=sim:switched,triggers=yes");
+  const auto is_switching = [&h] {
+    const QueryPtr query (new_query<SwitchAnswer> ());
+    EXPECT_TRUE (gst_pad_peer_query (h.get ()->srcpad, query.get ()));
+    return parse_query<SwitchAnswer> (query.get ())->switching;
+  };
+  h.start ();
+  h.send_frames (0, 30);
+  EXPECT_FALSE (is_switching ());
+  ASSERT_TRUE (ask (h, "white"));
+  EXPECT_TRUE (is_switching ());
+  int frame = 90;
+  h.send_frames (frame, frame + 1);
+  for (; is_switching () && frame < kPatience; frame++)
+    h.send_frames (frame + 1, frame + 2);
+  EXPECT_FALSE (is_switching ());
+  EXPECT_EQ (h.counter ("frames-lost"), 0u);
+  EXPECT_FALSE (h.element_message ("codedexposure/frames-lost"));
+
+  h.send_frames (frame + 1, frame + 200);
+  EXPECT_FALSE (h.element_message ("dmdsync/frame-rate"));
+  h.send_frames (frame + 203, frame + 204);
+  EXPECT_EQ (h.counter ("frames-lost"), 3u);
+}
+
+TEST (DmdSyncPattern, FramesOfACameraThatTheDmdDoesNotTriggerAreLostInASwitch)
+{
+  SyncHarness h ("device=sim:free");
+  h.start ();
+  h.send_frames (0, 30);
+  ASSERT_TRUE (ask (h, "white"));
+  h.send_frames (33, 34);
+  EXPECT_EQ (h.counter ("frames-lost"), 3u);
+  EXPECT_TRUE (h.element_message ("codedexposure/frames-lost"));
 }

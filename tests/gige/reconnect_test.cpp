@@ -177,6 +177,30 @@ TEST_F (Reconnect, AProcessThatWasStoppedGoesOnAndBlamesNoCamera)
   EXPECT_GE (counter ("frames-lost"), 200u);
 }
 
+/* For longer than the camera is waited for. */
+TEST_F (Reconnect, ACameraThatGetsNoTriggerWhileTheDmdGetsAMaskIsWaitedFor)
+{
+  CameraProcess camera (kSchedule);
+  play_line (camera_bin ("100/1", "GRAY8", "") +
+             "dmdsync name=sync device=sim:masks,triggers=yes,mask-time=500ms "
+             "schedule=" +
+             kSchedule + " timestamp-at=device-clock ! ");
+  ASSERT_TRUE (wait_frames (10));
+  GstStructure *pattern = gst_structure_new (
+      "dmdsync/pattern", "pattern", G_TYPE_STRING, "grating-x:12/0", nullptr);
+  ASSERT_TRUE (gst_element_send_event (pipeline->element ("sync").get (),
+      gst_event_new_custom (GST_EVENT_CUSTOM_UPSTREAM, pattern)));
+  camera.type ("lose@now:250");
+  const StructurePtr lost = wait_said ("codedexposure/camera-lost");
+  ASSERT_TRUE (lost);
+  EXPECT_STREQ (gst_structure_get_string (lost.get (), "reason"),
+      "the DMD triggers no frame while it gets masks");
+  ASSERT_TRUE (wait_said ("codedexposure/camera-back"));
+  ASSERT_TRUE (wait_frames (30));
+  EXPECT_EQ (counter ("frames-lost"), 0u);
+  pipeline->stop ();
+}
+
 TEST_F (Reconnect, ACameraThatStaysSilentIsOneErrorAfterTheTries)
 {
   CameraProcess camera (kSchedule);

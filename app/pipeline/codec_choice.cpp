@@ -2,8 +2,10 @@
 #include "codec_choice.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <memory>
 
@@ -74,9 +76,11 @@ disk_speed (const std::string &file)
   std::fill_n (static_cast<char *> (block.get ()), kBlock, '\0');
   const auto begin = Clock::now ();
   double bytes = 0;
+  int error = 0;
   for (int k = 0; k < kBlocks && seconds_since (begin) < kPatience; k++) {
     const auto done =
         write (direct >= 0 ? direct : written, block.get (), kBlock);
+    error = done < 0 ? errno : 0;
     if (done <= 0)
       break;
     bytes += double (done);
@@ -86,6 +90,10 @@ disk_speed (const std::string &file)
   for (const int open_file : {direct, written})
     if (open_file >= 0)
       close (open_file);
+  if (bytes < double (kBlock) && error != 0)
+    fail (format ("only %.3g MB can be written beside ", bytes / 1e6) + file +
+          ": " + std::strerror (error) +
+          "; delete files, or choose another disk");
   return speed;
 }
 

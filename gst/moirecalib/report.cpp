@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <functional>
 #include <numbers>
 
@@ -261,10 +262,13 @@ write_report (const std::string &path, const CalibrationReport &report)
     sheet.text (kMargin, y, line);
     y += kLine;
   }
-  if (!sheet.save (path))
-    return Error{"cannot write the report " + path +
-                 "; is there such a folder, and room?"};
-  return {};
+  if (sheet.save (path))
+    return {};
+  /* A part of a picture is none. */
+  std::error_code ignored;
+  std::filesystem::resize_file (path, 0, ignored);
+  return Error{"cannot write the report " + path +
+               "; check that its folder exists, and that the disk has room"};
 }
 
 } // namespace codedexposure

@@ -229,23 +229,26 @@ private:
   Result<void> look_for_late_frames ()
   {
     ASSIGN_OR_RETURN (off_, look (no_light (), 1, kFrames));
-    const auto when = [&] (Rig &rig, const StillMask &mask, double dark,
-                          double bright) -> Result<double> {
+    const auto when = [&] (Rig &rig, const StillMask &mask,
+                          const Measured &dark,
+                          const Measured &bright) -> Result<double> {
+      constexpr double kClear = 5.0; // standard deviations
+      if (!(bright.value - dark.value >
+              kClear * std::hypot (dark.sigma, bright.sigma)))
+        return -1.0;
       RETURN_IF_ERROR (rig_.show (mask, 1));
       const Nanoseconds begin = rig_.now ();
       ASSIGN_OR_RETURN (
           const Look seen, see (rig, begin, examination_.lag + kFrames));
       for (std::size_t k = 0; k < seen.levels.size (); k++)
-        if (seen.levels[k] > dark + kNew * (bright - dark))
+        if (seen.levels[k] > dark.value + kNew * (bright.value - dark.value))
           return seen.arrivals[k];
       return -1.0;
     };
-    ASSIGN_OR_RETURN (
-        const double first, when (rig_, lit (0, 1), off_.first.level ().value,
-                                on_.first.level ().value));
+    ASSIGN_OR_RETURN (const double first,
+        when (rig_, lit (0, 1), off_.first.level (), on_.first.level ()));
     ASSIGN_OR_RETURN (const double second,
-        when (second_, no_light (), on_.second.level ().value,
-            off_.second.level ().value));
+        when (second_, no_light (), on_.second.level (), off_.second.level ()));
     const bool known = first >= 0.0 && second >= 0.0;
     const double late = std::round ((second - first) / period_) + 0.0; // not -0
     finding_.readings.push_back ({"frames of the second camera are later by",

@@ -113,6 +113,7 @@ TEST (SecondCheck, NamesWhatIsWrong)
       {"frame-late=1", "second-frame-late"},
       {"bright=1.6", "second-bright"},
       {"dark=0.03", "second-dark"},
+      {"dark=0", "second-dark"},
       {"blur=3", "blur"},
       {"focus-tilt=3:30", "focus-tilt"},
       {"shift=0/-60", "second-shift"},

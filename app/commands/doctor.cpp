@@ -343,13 +343,9 @@ private:
     say (std::string ("result: ") + verdict_text (worst ()));
     if (worst () == Verdict::fail)
       return Exit::failed;
-    const bool known =
-        std::ranges::none_of (findings_, [] (const Finding &finding) {
-          return finding.verdict () == Verdict::unknown;
-        });
-    if (known)
+    if (std::ranges::all_of (findings_, &Finding::is_known))
       return Exit::done;
-    say ("not all is known: see the checks that are UNKNOWN");
+    say ("not all is known: see what is UNKNOWN or was not measured");
     return Exit::not_known;
   }
 
@@ -393,8 +389,8 @@ and parks the mirrors. Without --camera, it examines a simulated bench.
 )",
       .notes = R"(
 Exit status: 0 all is good, or worth a warning; 1 a check failed, or could not
-be made; 2 wrong usage; 4 none failed, but of one or more it is not known;
-130 stopped.
+be made; 2 wrong usage; 4 none failed, but not all is known, be it beside a
+warning; 130 stopped.
 
 Examples:
   A camera and a DMD on the USB:

@@ -31,6 +31,16 @@ Finding::verdict () const
   return worst;
 }
 
+bool
+Finding::is_known () const
+{
+  return std::ranges::all_of (readings, [] (const Reading &reading) {
+    return is_finite (reading.number);
+  }) && std::ranges::none_of (diagnoses, [] (const Diagnosis &diagnosis) {
+    return diagnosis.severity == Verdict::unknown;
+  });
+}
+
 const Reading *
 Finding::reading (std::string_view name) const
 {

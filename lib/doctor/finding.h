@@ -64,6 +64,8 @@ struct Finding {
   /** The worst of the diagnoses; unknown if there is none, but a reading that
    * is no finite number. */
   Verdict verdict () const;
+  /** Whether every reading is a finite number, and no diagnosis is unknown. */
+  bool is_known () const;
   /** Whether a diagnosis says that something is wrong. */
   bool is_ill () const { return verdict () >= Verdict::warn; }
   /** Null if there is none of that name. */

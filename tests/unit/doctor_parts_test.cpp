@@ -299,6 +299,7 @@ TEST (Findings, WhatIsNotKnownIsNotGood)
     EXPECT_EQ (json["verdict"], "UNKNOWN");
     finding.blame ("dark", "why", Verdict::warn);
     EXPECT_EQ (finding.verdict (), Verdict::warn);
+    EXPECT_FALSE (finding.is_known ());
   }
 }
 

@@ -162,8 +162,8 @@ move_file (const std::string &from, const std::string &to, bool replace)
 {
   int failed = renameat2 (AT_FDCWD, from.c_str (), AT_FDCWD, to.c_str (),
       replace ? 0 : RENAME_NOREPLACE);
+  std::error_code ignored;
   if (failed != 0 && errno == EINVAL) { // a file system without that flag
-    std::error_code ignored;
     if (replace || !fs::exists (to, ignored))
       failed = std::rename (from.c_str (), to.c_str ());
     else
@@ -171,7 +171,15 @@ move_file (const std::string &from, const std::string &to, bool replace)
   }
   if (failed == 0)
     return {};
-  return Error{"cannot rename " + from + " to " + to + ": " + reason (errno) +
+  const int error = errno;
+  if (error == ENOENT && !fs::exists (from, ignored))
+    return Error{from +
+                     " is gone; it, or its folder, was removed or renamed "
+                     "while it was written. If it is elsewhere, rename it "
+                     "to " +
+                     to,
+        ErrorCode::io};
+  return Error{"cannot rename " + from + " to " + to + ": " + reason (error) +
                    "; rename it yourself",
       ErrorCode::io};
 }

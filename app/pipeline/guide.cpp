@@ -107,7 +107,7 @@ private:
       return unwritten_ ? Exit::failed : Exit::done;
     if (run.interrupted)
       status_.line ("stopped; the mirrors show the schedule again");
-    else if (run.exit == Exit::done && !tried_)
+    else if (run.exit == Exit::done && !failed_)
       status_.line (
           "error: the frames ended before there was a mapping; set more "
           "--frames, or leave it out");
@@ -143,11 +143,11 @@ private:
             std::string (keys_ != 0 && state == "coarse"
                              ? "; press Enter to start the mapping now"
                              : ""));
-    tried_ |= state == "mapping";
-    if (state == "failed" && keys_ != 0)
+    failed_ = state == "failed";
+    if (failed_ && keys_ != 0)
       status_.line ("the mapping failed; correct the bench and press Enter to "
                     "try again");
-    else if (state == "failed")
+    else if (failed_)
       end ();
   }
 
@@ -236,7 +236,7 @@ private:
   Status status_;
   int readings_ = 0;
   std::string last_reading_;
-  bool tried_ = false; ///< a mapping was begun
+  bool failed_ = false; ///< the last mapping
   bool mapped_ = false, second_mapped_ = false;
   bool unwritten_ = false; ///< a requested file could not be written
   guint keys_ = 0;         ///< source of keys; 0: no terminal

@@ -72,7 +72,8 @@ public:
     MeasureOptions options{.recording = recording_,
         .decode = decode_,
         .line = line_.value_or ("row:50%"),
-        .run = run_};
+        .run = run_,
+        .said = &said_};
     PageFolder folder (*output_, run_.force);
     options.coded_csv = folder.path ("coded.csv");
     options.subframes_csv = folder.path ("subframes.csv");
@@ -175,7 +176,7 @@ private:
   {
     Job job ("report", run_);
     job.options.json = job.has_result = false;
-    job.is_repeated = true;
+    job.said = &said_;
     job.salvage = salvage;
     job.times = times;
     Chain frames = read_recording (job, recording_);
@@ -214,6 +215,7 @@ private:
   std::optional<double> at_;
   DecodeOptions decode_;
   RunOptions run_;
+  std::set<std::string> said_; // warnings
   bool damaged_ = false;
 };
 

@@ -55,7 +55,7 @@ measure_once (const MeasureOptions &options, bool salvage)
   job.options.json = job.has_result = false;
   job.salvage = all.salvaged = salvage;
   job.times = options.times;
-  job.is_repeated = options.times.is_part ();
+  job.said = options.said;
   all.coded.details = all.subframes.details = options.details;
   if (options.decode.bits)
     all.coded.bits = all.subframes.bits = *options.decode.bits;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -55,6 +56,8 @@ struct MeasureOptions {
   PlayTimes times = {};
   bool details = false;
   RunOptions run = {};
+  /** As that of the Job. */
+  std::set<std::string> *said = nullptr;
 };
 
 /** Runs through a recording; salvages a damaged one. Throws Failure. */

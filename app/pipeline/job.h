@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -119,8 +120,9 @@ struct Job {
   bool is_moved_in = false;
   /** Shows "100 coded frames in 0:04" as they come. */
   bool has_progress = true;
-  /** A run before has read these frames, and said what is wrong with them. */
-  bool is_repeated = false;
+  /** Warnings that were said, which are not said again; this run adds its own.
+   * Null: all are said. */
+  std::set<std::string> *said = nullptr;
   /** Prints "100 coded frames of ...; wrote ...". */
   bool has_result = true;
   /** Called with each element message, on the main thread. */

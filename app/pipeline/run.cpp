@@ -396,8 +396,14 @@ Run::on_element_message (const GstStructure *structure, GstMessage *message)
           job_.hurried, GST_ELEMENT (GST_MESSAGE_SRC (message))))
     return;
   const std::string text = notice (message, origin_);
-  if (!text.empty () && !job_.is_repeated &&
-      std::exchange (noticed_, text) != text)
+  if (!text.empty () && std::exchange (noticed_, text) != text)
+    warn (text);
+}
+
+void
+Run::warn (const std::string &text)
+{
+  if (!job_.said || job_.said->insert (text).second)
     status_.line (text);
 }
 
@@ -417,8 +423,7 @@ Run::on_message (GstMessage *message)
       on_error (message);
     break;
   case GST_MESSAGE_WARNING:
-    if (!job_.is_repeated)
-      status_.line ("warning: " + told (message));
+    warn ("warning: " + told (message));
     break;
   case GST_MESSAGE_INFO:
     if (job_.options.verbose)

@@ -44,6 +44,7 @@ private:
   void on_message (GstMessage *message);
   void on_error (GstMessage *message);
   void on_element_message (const GstStructure *structure, GstMessage *message);
+  void warn (const std::string &text);
   bool try_to_connect_again (std::string_view kind, const GError *error);
   bool is_closed_window (GstObject *source, const GError *error) const;
   void start_playing ();

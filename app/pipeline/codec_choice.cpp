@@ -77,9 +77,13 @@ disk_speed (const std::string &file)
   const auto begin = Clock::now ();
   double bytes = 0;
   int error = 0;
+  int to = direct >= 0 ? direct : written;
   for (int k = 0; k < kBlocks && seconds_since (begin) < kPatience; k++) {
-    const auto done =
-        write (direct >= 0 ? direct : written, block.get (), kBlock);
+    auto done = write (to, block.get (), kBlock);
+    if (done < 0 && errno == EINVAL && to == direct) {
+      to = written; // some file systems open files so, and do not write so
+      done = write (to, block.get (), kBlock);
+    }
     error = done < 0 ? errno : 0;
     if (done <= 0)
       break;

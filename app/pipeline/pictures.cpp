@@ -133,12 +133,11 @@ Pictures::Pictures (GstElement *sink, GstPad *coded, const std::string &format)
 }
 
 std::string
-Pictures::unfinished () const
+Pictures::place () const
 {
-  return (fills_named_folder () ? names_.folder
-                                : names_.path (names_.prefix + names_.number +
-                                               names_.suffix)) +
-         ".part";
+  return fills_named_folder ()
+             ? names_.folder
+             : names_.path (names_.prefix + names_.number + names_.suffix);
 }
 
 Result<void>
@@ -163,9 +162,7 @@ Pictures::check_name (bool replace)
 {
   if (const auto names = PictureNames::parse (format_); !names)
     return names.error ();
-  name_ = fills_named_folder ()
-              ? names_.folder + "/"
-              : names_.path (names_.prefix + names_.number + names_.suffix);
+  name_ = place () + (fills_named_folder () ? "/" : "");
   std::error_code ignored;
   if (!names_.folder.empty () && fs::exists (names_.folder, ignored) &&
       !fs::is_directory (names_.folder, ignored))
@@ -177,8 +174,7 @@ Result<void>
 Pictures::claim (bool replace)
 {
   replace_ = replace;
-  part_ = std::make_unique<Part> (
-      fills_named_folder () ? names_.folder : name_, Part::kFolder);
+  part_ = std::make_unique<Part> (place (), Part::kFolder);
   if (auto claimed = part_->claim (replace); !claimed)
     return claimed;
   table_.reset (

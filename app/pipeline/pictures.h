@@ -45,7 +45,7 @@ public:
   Result<void> claim (bool replace) override;
   void name_element () override;
   std::string table () const override;
-  std::string unfinished () const override;
+  std::string unfinished () const override { return place () + ".part"; }
   std::string preparation () const override;
   Result<void> publish () override;
   bool has_content () const override;
@@ -55,6 +55,9 @@ private:
   {
     return names_.fill_folder () && !names_.folder.empty ();
   }
+  /** The folder that they fill, or the name of each, with a place for its
+   * number. */
+  std::string place () const;
   Result<void> check_unused () const;
   void watch_flags (GstPad *sink_pad);
   void add (GstPad *pad, GstBuffer *picture);
